@@ -151,9 +151,17 @@ bool Reader::scan(const GoesOn& goes_on) {
     const bool whole = decoder.ok() && length <= size - offset - kRecordHeadBytes;
     const auto content = whole ? bytes_->read(offset + kRecordHeadBytes, length) : std::nullopt;
     if (!content || opcode == 0) {
-      unread_bytes_ += size - offset;
-      problem("ends in the middle of a record at byte " + std::to_string(offset) + " of " + std::to_string(size));
-      return true;
+      const auto next = chunk_behind(offset);
+      unread_bytes_ += next.value_or(size) - offset;
+      const std::string where = "byte " + std::to_string(offset) + " of " + std::to_string(size);
+      if (!next) {
+        problem("ends in the middle of a record at " + where);
+        return true;
+      }
+      problem("no record begins at " + where + ", where one should; goes on with the chunk at byte " +
+              std::to_string(*next));
+      offset = *next;
+      continue;
     }
     if (!scan_record(opcode, offset, *content)) {
       unread_bytes_ += kRecordHeadBytes + length;
@@ -163,6 +171,31 @@ bool Reader::scan(const GoesOn& goes_on) {
     offset += kRecordHeadBytes + length;
   }
   return true;
+}
+
+// Where a length is damaged, or a block of the disk, the whole chunks behind it are still there.
+std::optional<uint64_t> Reader::chunk_behind(uint64_t offset) const {
+  constexpr uint64_t kBlockBytes = 1U << 20U;
+  const auto is_chunk = [&](uint64_t at) {
+    const auto head = bytes_->read(at, kRecordHeadBytes);
+    Decoder decoder(head ? ByteView(*head) : ByteView());
+    const uint8_t opcode = decoder.u8();
+    const uint64_t length = decoder.u64();
+    if (!decoder.ok() || opcode != static_cast<uint8_t>(Opcode::chunk)) return false;
+    if (length > bytes_->size() - at - kRecordHeadBytes) return false;
+    const auto content = bytes_->read(at + kRecordHeadBytes, length);
+    ChunkHead chunk;
+    ByteView stored;
+    return content && parse(*content, chunk, stored) && chunk.crc != 0 && chunk_records(chunk, stored).ok();
+  };
+  for (uint64_t at = offset + 1; at < bytes_->size(); at += kBlockBytes) {
+    const auto block = bytes_->read(at, std::min(kBlockBytes, bytes_->size() - at));
+    if (!block) return std::nullopt;
+    for (size_t i = 0; i < block->size(); ++i) {
+      if ((*block)[i] == static_cast<uint8_t>(Opcode::chunk) && is_chunk(at + i)) return at + i;
+    }
+  }
+  return std::nullopt;
 }
 
 bool Reader::scan_record(uint8_t opcode, uint64_t offset, ByteView content) {

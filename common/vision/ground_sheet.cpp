@@ -130,8 +130,8 @@ void TopViewMaker::make(const cv::Mat& grey, const SheetPose& pose, TopView& out
     const double ahead_m = sheet_.ahead_m(row);
     map_row(pose, camera_from_track, ahead_m);
     auto* line = sharp_.ptr<float>(row);
-    const auto [u_min, u_max] = std::minmax(u_px_.front(), u_px_.back());
-    const auto [v_min, v_max] = std::minmax(v_px_.front(), v_px_.back());
+    const auto [u_min, u_max] = std::ranges::minmax(u_px_);
+    const auto [v_min, v_max] = std::ranges::minmax(v_px_);  // a lens bends the row
     const bool seen = u_min >= 1 && v_min >= 1 && u_max < static_cast<float>(camera_.width_px - 3) &&
                       v_max < static_cast<float>(camera_.height_px - 3);
     out.row_seen[static_cast<size_t>(row)] = seen ? 1 : 0;

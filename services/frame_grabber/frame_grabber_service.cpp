@@ -312,7 +312,7 @@ void FrameGrabberService::say_health(uint32_t health) {
     return context_.health().degraded("pictures cannot be sent: the middleware takes none; see that /dev/shm has room");
   bad_in_a_row_ = health == 0 ? 0 : bad_in_a_row_ + 1;
   if (bad_in_a_row_ == 0) context_.health().active();
-  if (bad_in_a_row_ == kBadBeforeDegraded) context_.health().degraded(complaint(health));
+  if (bad_in_a_row_ >= kBadBeforeDegraded) context_.health().degraded(complaint(health));
 }
 
 void FrameGrabberService::broken(const std::string& why) {

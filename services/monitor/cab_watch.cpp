@@ -62,7 +62,8 @@ void CurvatureTrail::add(double distance_m, double per_m, double sigma_per_m) {
     if (moved_m > kLengthM) points_.clear();  // another run
   }
   points_.push_back({distance_m, per_m, sigma_per_m});
-  while (std::abs(distance_m - points_.front().distance_m) > kLengthM) points_.pop_front();
+  constexpr size_t kMost = 2 * static_cast<size_t>(kLengthM / kPointEveryM);  // of a train that is moved to and fro
+  while (points_.size() > kMost || std::abs(distance_m - points_.front().distance_m) > kLengthM) points_.pop_front();
 }
 
 nlohmann::json CurvatureTrail::seen_from(double distance_m) const {

@@ -202,7 +202,7 @@ void MonitorService::on_log(const Arrived& arrived) {
     foxglove_.publish(kFoxgloveLog, {arrived.info.received_ns, foxglove_log(record)});
   }
   log_.push_back(log_record(record));
-  log_fresh_.push_back(log_.back());
+  if (live_.watched("log")) log_fresh_.push_back(log_.back());
   if (log_.size() > kLogKept) log_.pop_front();
 }
 
@@ -282,6 +282,13 @@ void MonitorService::show_channels() {
   foxglove_.set_channels(channels);
 }
 
+// What is measured live has no clock that would end the silence which a replay has left.
+bool MonitorService::played_data_has_ended() const {
+  if (!clock_.sample || clock_.sample->ended() == 0) return false;
+  const auto newest_ns = std::max(state_.arrived_ns, gnss_.arrived_ns);
+  return core::seconds(newest_ns - clock_.arrived_ns) < kAbsentS;
+}
+
 TrainSeen MonitorService::train_seen() {
   TrainSeen train;
   train.now_ns = core::monotonic_ns();
@@ -298,8 +305,7 @@ TrainSeen MonitorService::train_seen() {
   if (recent(recorder_)) train.recorder = recorder_.sample;
   if (recent(gnss_)) train.gnss = gnss_.sample;
   train.played = recent(player_);
-  train.data_stands = (clock_.sample && clock_.sample->ended() != 0) ||
-                      (train.played && player_.sample->state() != msg::PLAYER_PLAYING);
+  train.data_stands = played_data_has_ended() || (train.played && player_.sample->state() != msg::PLAYER_PLAYING);
   std::error_code failed;
   const auto shared_memory = std::filesystem::space("/dev/shm", failed);
   if (!failed) train.shared_memory_free_mb = static_cast<double>(shared_memory.available) / 1e6;

@@ -41,6 +41,7 @@ class MonitorService {
   }
 
   // monitor_service.cpp: samples, and what is wrong
+  [[nodiscard]] bool played_data_has_ended() const;
   void start_timers();
   void beat();
   void restart();

@@ -20,7 +20,7 @@ constexpr double kCurvatureAheadM = 300;
 }  // namespace
 
 std::optional<track::EdgePosition> MonitorService::place() const {
-  if (!state_.sample || state_.sample->track_known() == 0) return std::nullopt;
+  if (!recent(state_) || state_.sample->track_known() == 0) return std::nullopt;
   return messaging::place_of(*state_.sample);
 }
 
@@ -65,10 +65,7 @@ void MonitorService::publish_pictures() {
 
 void MonitorService::publish_state() {
   if (!live_.watched("state")) return;
-  const bool is_new = state_sent_ns_ != state_.arrived_ns;
   state_sent_ns_ = state_.arrived_ns;
-  if (!is_new && state_.sample)
-    return live_.publish("state", {{"kind", "state"}, {"age_s", state_.age_s(core::monotonic_ns())}});
   for (const auto& message : first("state")) live_.publish("state", message);
 }
 
@@ -120,10 +117,12 @@ std::vector<json> MonitorService::first(const std::string& kind) {
   const int64_t now_ns = core::monotonic_ns();
   if (kind == "state") {
     if (!state_.sample) return {{{"kind", "state"}, {"age_s", nullptr}}};
-    return {state_message(*state_.sample, state_.age_s(now_ns), recent(pose_) ? &*pose_.sample : nullptr,
-                          recent(choice_) ? &*choice_.sample : nullptr, map_ ? &*map_ : nullptr)};
+    auto message = state_message(*state_.sample, state_.age_s(now_ns), recent(pose_) ? &*pose_.sample : nullptr,
+                                 recent(choice_) ? &*choice_.sample : nullptr, map_ ? &*map_ : nullptr);
+    message["sent_ns"] = now_ns;  // by a clock that nobody sets: who gets it sees whether the link delays it
+    return {std::move(message)};
   }
-  if (kind == "curvature") return state_.sample ? std::vector{curvature_message()} : std::vector<json>{};
+  if (kind == "curvature") return recent(state_) ? std::vector{curvature_message()} : std::vector<json>{};
   if (kind == "services") return {services_message(services_, now_ns, core::wall_ns())};
   if (kind == "topics") return {topics_message(topics_shown())};
   if (kind == "log") return {log_message(json(log_))};

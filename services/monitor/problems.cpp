@@ -48,8 +48,9 @@ void judge_services(const TrainSeen& train, Problems& problems) {
     const std::string reason = seen.status.reason().c_str();
     const double silent_s = core::seconds(train.now_ns - seen.received_ns);
     if (seen.stopped()) {
-      problems.push_back(
-          {"stopped " + id, Level::warning, on_host + " was stopped", "Start it again when it is needed."});
+      const bool is_expected = std::ranges::find(train.expected, name) != train.expected.end();
+      problems.push_back({"stopped " + id, is_expected ? Level::error : Level::warning, on_host + " was stopped",
+                          "Start it again when it is needed."});
     } else if (!seen.alive) {
       problems.push_back({"silent " + id, Level::error, on_host + " is dead or frozen: no sign of life",
                           "Look at the last lines of its log, then start it again."});

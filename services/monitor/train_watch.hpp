@@ -43,7 +43,7 @@ class TrainWatch {
     TopicStatistics statistics;
     std::unique_ptr<messaging::AnyReader> reader;
     int64_t read_since_ns = 0;  // monotonic
-    size_t fixed_bytes = 0;  // of every sample, 0 = not fixed
+    size_t fixed_bytes = 0;     // of every sample, 0 = not fixed
   };
   /// All that were ever read.
   [[nodiscard]] const std::map<std::string, Topic>& topics() const { return topics_; }

@@ -1,5 +1,7 @@
 #include "monitor/web_socket.hpp"
 
+#include <netinet/tcp.h>
+
 #include <algorithm>
 
 #include "core/cut_text.hpp"
@@ -15,6 +17,7 @@ namespace asio = boost::asio;
 constexpr size_t kLongestMessage = 64 * 1024;
 // Pictures must not pile up in the kernel, where a newer one cannot take their place.
 constexpr int kSendBufferBytes = 256 * 1024;
+constexpr int kUnsentBytes = 16 * 1024;  // more is not taken by the kernel before the link has carried it
 constexpr std::chrono::seconds kWatchPeriod{1};
 constexpr std::chrono::seconds kHandshake{10};
 constexpr std::chrono::seconds kIdle{30};
@@ -44,6 +47,8 @@ void WebSocket<Stream>::accept(const HttpRequest& upgrade) {
   beast::error_code ignored;
   beast::get_lowest_layer(stream_).socket().set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
   beast::get_lowest_layer(stream_).socket().set_option(asio::ip::tcp::no_delay(true), ignored);
+  beast::get_lowest_layer(stream_).socket().set_option(
+      asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>(kUnsentBytes), ignored);
   stream_.set_option(websocket::stream_base::timeout{kHandshake, kIdle, true});
   stream_.set_option(websocket::stream_base::decorator([protocol = subprotocol_](websocket::response_type& response) {
     if (!protocol.empty()) response.set(beast::http::field::sec_websocket_protocol, protocol);
@@ -86,12 +91,13 @@ void WebSocket<Stream>::queue(Frame frame) {
   const auto same = frame.slot.empty() ? waiting_.end()
                                        : std::find_if(waiting_.begin(), waiting_.end(),
                                                       [&](const Frame& waiting) { return waiting.slot == frame.slot; });
-  if (same != waiting_.end()) {
-    waiting_bytes_ -= same->bytes->size();
-    waiting_.erase(same);
-  }
   waiting_bytes_ += frame.bytes->size();
-  waiting_.push_back(std::move(frame));
+  if (same != waiting_.end()) {  // in its place: behind the others it would be overtaken for ever
+    waiting_bytes_ -= same->bytes->size();
+    *same = std::move(frame);
+  } else {
+    waiting_.push_back(std::move(frame));
+  }
   if (waiting_bytes_ > shared_->options.client_queue_bytes && !make_room()) {
     return say_goodbye("too slow", websocket::close_code::policy_error);
   }

@@ -67,6 +67,10 @@ void OdometryService::restart() {
 
 void OdometryService::calibrated(const msg::CameraCalibration& c) {
   if (config_.camera != c.camera().c_str()) return;
+  // A frame_grabber that has begun anew says it once more, and the distance goes on.
+  auto said = messaging::serialize(c);
+  if (said == calibration_) return;
+  calibration_ = std::move(said);
   intrinsics_ = messaging::intrinsics_of(c);
   mount_ = messaging::mount_of(c);
   mount_known_ = c.mount_known();
@@ -106,7 +110,7 @@ void OdometryService::pictured(const msg::CameraFrame& frame) {
 }
 
 void OdometryService::take_pose(const Waiting& waiting, const msg::TrackView* view, MousePicture& picture) {
-  const bool fresh = last_pose_ns_ != 0 && waiting.stamp_ns - last_pose_ns_ < kPoseLifeNs;
+  const bool fresh = last_pose_ns_ != 0 && std::abs(waiting.stamp_ns - last_pose_ns_) < kPoseLifeNs;
   picture.pose = fresh ? last_pose_ : mount_;
   picture.curvature_per_m = curvature_per_m_;
   picture.vertical_curvature_per_m = vertical_curvature_per_m_;
@@ -174,7 +178,8 @@ void OdometryService::publish(const MouseStep& step, const Waiting& waiting) {
 }
 
 void OdometryService::tell(const MouseStep& step, uint32_t picture_health) {
-  if (step.valid || last_valid_ns_ == 0) last_valid_ns_ = step.stamp_ns;
+  const bool clock_set_back = step.stamp_ns < last_valid_ns_;
+  if (step.valid || last_valid_ns_ == 0 || clock_set_back) last_valid_ns_ = step.stamp_ns;
   if (step.stamp_ns - last_valid_ns_ > kBlindNs) {
     const char* useless = messaging::why_useless(picture_health);
     context_.health().degraded(useless != nullptr ? std::string("blind: ") + useless

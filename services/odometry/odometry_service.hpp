@@ -39,6 +39,7 @@ class OdometryService {
   geometry::Intrinsics intrinsics_;
   geometry::CameraPose mount_;
   bool mount_known_ = false;
+  std::vector<uint8_t> calibration_;   // as it was said
   std::unique_ptr<TrainMouse> mouse_;  // nothing before the calibration is known
   PictureViews<Waiting, msg::TrackView> views_;
   std::vector<cv::Mat> spare_;  // picture buffers to use again

@@ -119,7 +119,9 @@ void Housekeeper::recover_next() {
   if (lost.ok()) {
     const std::lock_guard files(files_mutex_);
     take_place(file, name);
-    warn(file.string() + " was left by a crash; what it held is now in " + name.string());
+    std::string sentence = file.string() + " was left by a crash; what it held is now in " + name.string();
+    for (const auto& what : lost.value()) sentence += "; " + what;
+    warn(sentence);
   } else if (!ending_) {
     cut_off_.push_back({file, recovery_ended(file, lost.error())});
   }

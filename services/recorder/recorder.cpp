@@ -288,12 +288,13 @@ void Recorder::guard_disk() {
   event_ends_ns_ = 0;
   if (!recording_) return;
   const std::string file = recording_->file().string();
-  (void)end();
+  const auto ended = end();
   stopped_by_disk_ = true;
   const auto free_mb = static_cast<int64_t>(config_.keep_free_mb);
   problem_ = "recording stopped: the disk of " + file + " has less than " + std::to_string(free_mb) +
              " MB free; goes on in a new file when " +
              std::to_string(static_cast<int64_t>(kRoomAgain * config_.keep_free_mb)) + " MB are free";
+  if (!ended.ok()) problem_ += "; " + ended.error().message;
 }
 
 void Recorder::resume_when_there_is_room() {
@@ -336,6 +337,7 @@ void Recorder::publish_state() {
   now.recording = recording_ != nullptr;
   now.paused = paused_;
   now.ring = ring_.has_value();
+  now.is_wanted = config_.autostart;
   now.ring_s = ring_ ? ring_->seconds() : 0;
   now.received = received_;
   now.written = written_;

@@ -20,6 +20,7 @@ struct RecorderState {
   bool recording = false;  // a file is open
   bool paused = false;     // ... and nothing goes into it
   bool ring = false;       // the last seconds are kept in memory
+  bool is_wanted = false;  // it records from the beginning: without a file somebody, or a full disk, has stopped it
   std::string file;
   int64_t started_ns = 0;  // of the file
   uint64_t messages = 0;   // in the file

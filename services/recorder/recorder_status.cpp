@@ -19,7 +19,7 @@ double megabytes(uint64_t bytes) {
 uint8_t state_of(const RecorderState& state) {
   if (state.paused) return msg::RECORDER_PAUSED;
   if (state.recording) return msg::RECORDER_RECORDING;
-  return state.ring ? msg::RECORDER_WAITING : msg::RECORDER_STOPPED;
+  return state.ring && !state.is_wanted ? msg::RECORDER_WAITING : msg::RECORDER_STOPPED;
 }
 
 msg::LostSamples lost_of(const TopicLosses& losses) {

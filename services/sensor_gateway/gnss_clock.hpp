@@ -17,6 +17,8 @@ class GnssClock {
   /// Nothing while it is not known: the first reports teach, and two clocks that both claim to be right do not agree
   /// (see contradiction_s). REQUIRES: utc_ns growing, in the order of arrival.
   [[nodiscard]] std::optional<int64_t> stamp_ns(int64_t utc_ns, const core::HostTime& arrival, bool clock_is_kept);
+  /// Reports come anew: whether the clocks contradict each other is asked again.
+  void connected() { contradiction_s_.reset(); }
   /// How much this host's clock, which is kept, is ahead of the receiver's where the two contradict; nothing otherwise.
   [[nodiscard]] std::optional<double> contradiction_s() const { return contradiction_s_; }
 

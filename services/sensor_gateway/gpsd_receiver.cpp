@@ -50,6 +50,7 @@ class GpsdReceiver final : public LiveSensor {
 
   core::Result<std::string> connect() override {
     reports_.connected();
+    clock_.connected();
     auto status = line_.connect(place_.address);
     if (status.ok()) status = line_.write(GpsdReports::kRequest);
     if (status.ok()) return name() + " is connected";

@@ -340,7 +340,9 @@ void EdgeTracker::settle() {
     edge.stripe_count = candidate.stripe_count;
     settled_.push_back(edge);
   }
-  std::erase_if(candidates_, [this](const Candidate& candidate) { return way_m_ - candidate.hit_m >= kPatienceM; });
+  // Those that a train backs away from are seen anew when it comes again.
+  std::erase_if(candidates_,
+                [this](const Candidate& candidate) { return std::abs(way_m_ - candidate.hit_m) >= kPatienceM; });
 }
 
 }  // namespace railfix::track_detector

@@ -99,7 +99,7 @@ GroundMotion::Match GroundMotion::match(double from_m, double to_m, double cell_
 }
 
 GroundMotion::Match GroundMotion::match_anywhere(double dt_s, double cell_m) const {
-  return match(-kWindowM, max_speed_mps_ * dt_s, cell_m);
+  return match(-kWindowM, std::min(max_speed_mps_ * dt_s, rows_ * cell_m), cell_m);
 }
 
 // A step that is wrong by the distance of sleepers fits for ever, but the ballast between them does not.

@@ -126,7 +126,7 @@ void LandmarkFinder::find_in_track(const LandmarkPicture& picture) {
             std::hypot(plate.sigma_m, depth_m, pitch_m), plate.confidence},
            picture);
   }
-  if (!options_.frogs || way_m_ - frog_look_m_ < kLookM) return;
+  if (!options_.frogs || std::abs(way_m_ - frog_look_m_) < kLookM) return;
   frog_look_m_ = way_m_;
   for (const SettledThing& frog : frogs_.follow(frog_search_.find(picture), way_m_)) {
     const double pitch_m = pitch_error_m(picture, frog.reference_m, 0);
@@ -138,7 +138,7 @@ void LandmarkFinder::find_in_track(const LandmarkPicture& picture) {
 
 void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
   const bool frogs_took_this_picture = frog_look_m_ == way_m_;
-  if (way_m_ - platform_look_m_ < (frogs_took_this_picture ? 1.5 : 1.0) * kLookM) return;
+  if (std::abs(way_m_ - platform_look_m_) < (frogs_took_this_picture ? 1.5 : 1.0) * kLookM) return;
   platform_look_m_ = way_m_;
   for (const SettledPlatform& end : platforms_.follow(platform_search_.find(picture), way_m_)) {
     if (uprights_.in_tunnel(way_m_) || uprights_.lit_walls()) continue;  // walls, ducts and lamps look like platforms

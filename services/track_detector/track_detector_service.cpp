@@ -54,8 +54,10 @@ TrackDetectorService::TrackDetectorService(const Config& config, service::Contex
       writer_(context.writer(messaging::topics::track_view)),
       sighting_writer_(context.writer(messaging::topics::landmark_sighting)) {
   context_.health().flows(service::Flow::answers);
-  context_.on<msg::CameraCalibration>(messaging::topics::camera_calibration,
-                                      [this](const msg::CameraCalibration& c) { calibrated(c); });
+  context_.on<msg::CameraCalibration>(messaging::topics::camera_calibration, [this](const msg::CameraCalibration& c) {
+    const bool known = calibration_ && messaging::serialize(*calibration_) == messaging::serialize(c);
+    if (!known) calibrated(c);  // a frame_grabber begun anew says it once more
+  });
   context_.on<msg::CameraFrame>(
       messaging::topics::camera_frame, [this](const msg::CameraFrame& frame) { pictured(frame); }, config_.camera);
   if (config_.imu_roll.use) {
@@ -201,7 +203,8 @@ void TrackDetectorService::find_landmarks(const cv::Mat& grey, const TrackObserv
 }
 
 void TrackDetectorService::tell(const TrackObservation& observation, int64_t stamp_ns) {
-  if (observation.seen() || last_seen_ns_ == 0) last_seen_ns_ = stamp_ns;
+  const bool clock_set_back = stamp_ns < last_seen_ns_;
+  if (observation.seen() || last_seen_ns_ == 0 || clock_set_back) last_seen_ns_ = stamp_ns;
   if (stamp_ns - drift_ns_ > kDriftSaidNs || stamp_ns < drift_ns_) {
     drift_ = watch_->what_drifted();
     drift_ns_ = stamp_ns;

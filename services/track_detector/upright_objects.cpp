@@ -26,8 +26,8 @@ constexpr double kSameMastM = 1.5;
 constexpr double kSameBridgeM = 15;
 constexpr double kWorstSigmaM = 0.35;
 constexpr double kWorstEdgeM = 0.8;
-constexpr double kLongestTunnelM = 1500;  // a portal out may be missed
-constexpr double kOutM = 60;              // so long in daylight is no tunnel any more
+constexpr double kLongestTunnelM = 60000;  // the Gotthard's is 57 km; daylight ends one whose portal out was missed
+constexpr double kOutM = 60;               // so long in daylight is no tunnel any more
 constexpr size_t kUsuallyHeld = 200;
 // Grey levels beside the track. An exposure that adapts shows open land by day at 50 to 120, a tunnel's lining in the
 // headlamp's light at 25 to 60, open land at night below 22.
@@ -75,7 +75,7 @@ void UprightObjects::forget() {
 
 void UprightObjects::look_at_light(double beside_grey, double way_m) {
   if (!light_.known) light_ = {true, way_m, beside_grey, beside_grey, way_m};
-  const double step_m = way_m - light_.way_m;
+  const double step_m = std::abs(way_m - light_.way_m);
   light_.way_m = way_m;
   light_.near_grey += (beside_grey - light_.near_grey) * (1 - std::exp(-step_m / kNearGreyM));
   if (!in_tunnel(way_m)) {

@@ -160,6 +160,40 @@ TEST(Uprights, ATunnelHasOnePortalInAndOneOut) {
   EXPECT_NEAR(told[1].place_m, 72.5, 0.08);
 }
 
+TEST(Uprights, ATunnelMayBeLong) {
+  constexpr double kEndM = 5072.5;
+  EdgeTracker tracker;
+  UprightObjects objects;
+  std::vector<UprightObject> told;
+  std::vector<UprightEdge> edges;
+  const auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15},
+                                      {42.5, 2.7, 40, 70, 40, 15},
+                                      {kEndM - 2.5, 2.7, 150, 90, 160, 200},
+                                      {kEndM, 2.7, 210, 170, 210, 200}});
+  for (double way_m = 0; way_m < kEndM + 8; way_m += kStepM) {
+    const bool lining = way_m > 40 && way_m < kEndM - 15;  // the light beside the track is that of some metres ahead
+    LandmarkPicture picture;
+    picture.stamp_ns = core::to_ns(way_m / kSpeedMps);
+    const auto profile = see(corners, way_m, edges);
+    const auto& settled = tracker.follow(edges, profile, picture, way_m);
+    for (const auto& object : objects.add(settled, tracker, way_m, lining ? kLining : kDay)) told.push_back(object);
+  }
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, kEndM, 0.08);
+}
+
+TEST(Uprights, ATrainThatBacksOverOpenLandAtNightIsNotBetweenWalls) {
+  EdgeTracker tracker;
+  UprightObjects objects;
+  int between_walls = 0;
+  for (double way_m = 0; way_m > -1500; way_m -= kStepM) {
+    objects.add({}, tracker, way_m, way_m > -1 ? 18 : 14);
+    between_walls += objects.lit_walls() ? 1 : 0;
+  }
+  EXPECT_EQ(between_walls, 0);
+}
+
 TEST(Uprights, TheFaintEndOfABrightWallIsThePortalOut) {
   const auto corners =
       on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 210, 120, 205, 200}, {70.5, 2.7, 206, 210, 206, 200}});

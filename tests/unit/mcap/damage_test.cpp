@@ -81,6 +81,34 @@ TEST_F(DamageTest, CorruptChunkIsNamedAndTheOthersAreRead) {
   EXPECT_EQ(reader->problems().size(), said) << "said once";
 }
 
+// Of a file that was cut off, so that no index tells where the next one begins.
+TEST_F(DamageTest, ABrokenLengthOrBlockCostsTheChunksItIsInAndNoOthers) {
+  const auto all = samples(60);
+  const Bytes whole = content(record(all, small_chunks()));
+  const auto records = test::record_ends(whole);
+  std::vector<size_t> chunks;  // numbers of their records
+  for (size_t i = 0; i < records.size(); ++i) {
+    if (records[i].opcode == static_cast<uint8_t>(Opcode::chunk)) chunks.push_back(i);
+  }
+  ASSERT_GE(chunks.size(), 5U);
+  const size_t begin = records[chunks[2] - 1].offset;
+  const size_t lost = records[chunks[2]].messages - records[chunks[1]].messages;
+  const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(records[chunks.back()].offset));
+  for (const size_t of_length : {1, 2, 4, 8}) {
+    Bytes bytes = cut;
+    bytes[begin + of_length] ^= 0x41;
+    auto reader = Reader::open(store(bytes)).value();
+    EXPECT_GE(read(*reader).size(), all.size() - lost) << of_length;  // all, where it was too long only
+    EXPECT_FALSE(reader->problems().empty());
+  }
+  Bytes bytes = cut;
+  std::fill(bytes.begin() + static_cast<std::ptrdiff_t>(begin),
+            bytes.begin() + static_cast<std::ptrdiff_t>(records[chunks[2]].offset), uint8_t{0});
+  auto reader = Reader::open(store(bytes)).value();
+  EXPECT_EQ(read(*reader).size(), all.size() - lost);
+  EXPECT_THAT(reader->problems(), Contains(HasSubstr("goes on with the chunk at byte ")));
+}
+
 TEST_F(DamageTest, DamagedIndexFallsBackToTheScan) {
   const auto all = samples(40);
   Bytes bytes = content(record(all, small_chunks()));

@@ -87,6 +87,8 @@ TEST(CurvatureTrail, KeepsTheLastMetresBehindTheTrain) {
   EXPECT_DOUBLE_EQ(seen.front()[1], 1e-3);
   trail.add(5000, 0, 0);
   EXPECT_EQ(trail.seen_from(5000).size(), 1U) << "another run";
+  for (int i = 0; i < 100'000; ++i) trail.add(5000 + std::abs(i % 600 - 300), 0, 0);
+  EXPECT_LE(trail.seen_from(5000).size(), CurvatureTrail::kLengthM) << "of a train that is moved to and fro";
 }
 
 class OnALine : public ::testing::Test {

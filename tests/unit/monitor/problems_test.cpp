@@ -67,6 +67,9 @@ TEST_F(ProblemsTest, NamesServicesThatAreMissingDeadOrDegraded) {
   EXPECT_EQ(only().level, Level::error);
   board_.note(status("odometry", msg::STATE_STOPPED), kNow_ns);
   EXPECT_EQ(only().what, "odometry was stopped");
+  EXPECT_EQ(only().level, Level::error) << "the train needs it";
+  train_.expected.clear();
+  EXPECT_EQ(only().level, Level::warning);
 }
 
 TEST_F(ProblemsTest, SaysThatNobodyWasHeardYet) {

@@ -67,5 +67,14 @@ TEST(GnssClock, TwoClocksThatContradictAreNotBelieved) {
   }
 }
 
+TEST(GnssClock, AContradictionIsOfTheConnectionThatShowedIt) {
+  GnssClock clock(kLatencyNs);
+  EXPECT_FALSE(stamp_off_s(clock, 3, true, 6));
+  ASSERT_TRUE(clock.contradiction_s());
+  clock.connected();
+  EXPECT_FALSE(clock.contradiction_s());
+  EXPECT_EQ(stamp_off_s(clock, 0, true, 40, 100), 0.0) << "the receiver has learnt the leap seconds";
+}
+
 }  // namespace
 }  // namespace railfix::sensor_gateway

@@ -12,6 +12,12 @@ export function number(value: number | null | undefined, digits: number): string
   return sign + grouped + (rest === undefined ? "" : "." + rest);
 }
 
+/// A bound that is shown with so many digits must not be less than it is.
+export function outward(value: number | null | undefined, digits: number): number {
+  const parts = 10 ** digits;
+  return Math.ceil((value ?? 0) * parts - 1e-6) / parts;
+}
+
 function with_unit(value: number | null | undefined, digits: number, unit: string): string {
   const text = number(value, digits);
   return text === "unknown" ? text : `${text}${THIN}${unit}`;

@@ -16,6 +16,22 @@ export function age_s<T>(held: Held<T>, passed_ms: number, age_at_arrival_s = 0)
   return Math.max(0, (passed_ms - held.at_ms) / 1000) + Math.max(0, age_at_arrival_s);
 }
 
+/// How much later than the quickest message of a connection another one came: so long it has waited on the way. The two
+/// clocks, which nobody sets, may drift apart by a millisecond a second.
+export class LinkDelay {
+  private quickest_ms = Infinity;
+  private at_ms = 0;
+  reset(): void {
+    this.quickest_ms = Infinity;
+  }
+  late_s(sent_ms: number, arrived_ms: number): number {
+    const took_ms = arrived_ms - sent_ms;
+    this.quickest_ms = Math.min(took_ms, this.quickest_ms + (arrived_ms - this.at_ms) * 1e-3);
+    this.at_ms = arrived_ms;
+    return (took_ms - this.quickest_ms) / 1000;
+  }
+}
+
 export type Freshness = "live" | "stale" | "none";
 
 export function freshness(age: number, limit_s: number, connected: boolean): Freshness {

@@ -1,6 +1,6 @@
 // All that the page knows. Everything is bounded: an hour open holds no more than a minute does.
 import { computed, signal } from "@preact/signals";
-import { age_s, appended, FRESH_S, freshness, type Freshness, type Held, nothing } from "./stale";
+import { age_s, appended, FRESH_S, freshness, type Freshness, type Held, LinkDelay, nothing } from "./stale";
 import type { About, Curvature, LogRecord, MapData, Message, PlayerStatus, Problem, RecorderStatus, Report, Service, Topic, TrainState, View } from "./wire";
 
 export const LOG_LIMIT = 500;
@@ -66,17 +66,20 @@ export function age_of(kind: Kind): number {
 }
 export const fresh = (kind: Kind): Freshness => freshness(age_of(kind), FRESH_S[kind], connection.value.up);
 
+const link = new LinkDelay();
+
+/// A monitor that has just begun knows of none; what we hold grows old.
 function take_state(message: Partial<TrainState>): void {
-  if (message.edge !== undefined) {
-    state.value = { value: message as TrainState, at_ms: performance.now() };
-  } else if (state.value.value !== null && typeof message.age_s === "number") {
-    state.value = { value: { ...state.value.value, age_s: message.age_s }, at_ms: performance.now() };
-  } // null: a monitor that has just begun knows of none; what we hold grows old
+  if (message.edge === undefined) return;
+  const at_ms = performance.now();
+  const known = message as TrainState;
+  state.value = { value: { ...known, age_s: known.age_s + link.late_s(known.sent_ns / 1e6, at_ms) }, at_ms };
 }
 
 /// Called once a second.
 export function remember_moment(at_ms: number): void {
-  const live = fresh("state") === "live" ? state.value.value : null;
+  const age = age_s(state.value, performance.now(), state.value.value?.age_s ?? 0); // also while nobody sees the page
+  const live = freshness(age, FRESH_S.state, connection.value.up) === "live" ? state.value.value : null;
   const moment = { at_ms, speed_mps: live?.speed_mps ?? null, over_m: live?.over_m ?? null, under_m: live?.under_m ?? null };
   history.value = history.value.concat(moment).slice(-HISTORY_LIMIT);
 }
@@ -98,6 +101,7 @@ export function take(message: Message): void {
     case "hello":
       clock_offset_ms.value = Date.now() - message.now_ns / 1e6;
       problems.value = null; // of the connection before
+      link.reset();
       break;
     case "state":
       take_state(message);

@@ -1,9 +1,15 @@
 import { describe, expect, it } from "vitest";
-import { bend, bytes, bytes_per_s, clock, duration, hertz, kmh, metres, milliseconds, number, played, probability } from "../src/format";
+import { bend, bytes, bytes_per_s, clock, duration, hertz, kmh, metres, milliseconds, number, outward, played, probability } from "../src/format";
 
 const plain = (text: string) => text.replace(/\u202f/g, " ").replace(/\u2212/g, "-");
 
 describe("numbers", () => {
+  it("rounds bounds outward", () => {
+    expect(outward(12.49, 0)).toBe(13);
+    expect(outward(0.301, 2)).toBeCloseTo(0.31);
+    expect(outward(0.3, 2)).toBeCloseTo(0.3);
+    expect(outward(null, 1)).toBe(0);
+  });
   it("groups thousands from 10 000 on and says unknown for what is not known", () => {
     expect(plain(number(1234.56, 1))).toBe("1234.6");
     expect(plain(number(12345.6, 1))).toBe("12 345.6");

@@ -39,7 +39,7 @@ export function start_train({ port = 0, scenario = "well", page = join(here, "..
     const unknown = scenario === "unknown";
     const wide = scenario === "blind" ? 14 : 0.6;
     return {
-      kind: "state", stamp_ns: now_ns(), age_s: 0.03, edge: 1, offset_m, distance_m: offset_m - 1400, speed_mps: 20 + Math.sin(t / 9),
+      kind: "state", stamp_ns: now_ns(), age_s: 0.03, sent_ns: performance.now() * 1e6, edge: 1, offset_m, distance_m: offset_m - 1400, speed_mps: 20 + Math.sin(t / 9),
       acceleration_mps2: 0.11 * Math.cos(t / 9), over_m: wide + 0.2 * Math.sin(t / 4), under_m: wide + 0.3 + 0.2 * Math.sin(t / 4), sigma_m: wide / 4,
       integrity: unknown ? "unusable" : scenario === "blind" ? "degraded" : "ok", track_known: !unknown,
       track_probability: unknown ? 0.55 : 0.99993, direction: "forward", standstill: false,
@@ -89,7 +89,7 @@ export function start_train({ port = 0, scenario = "well", page = join(here, "..
     const jpeg = picture === null ? null : readFileSync(picture);
 
     const speak = {
-      state: [1, () => say(scenario === "unheard" ? { kind: "state", age_s: null } : scenario === "silent" && ticks > 30 ? { kind: "state", age_s: (ticks - 30) / 10 } : state())],
+      state: [1, () => say(scenario === "unheard" ? { kind: "state", age_s: null } : scenario === "silent" && ticks > 30 ? { ...state(), age_s: (ticks - 30) / 10 } : state())],
       curvature: [2, () => say(curvature())],
       services: [5, () => say({ kind: "services", services: services_of(scenario, began) })],
       topics: [10, () => say({ kind: "topics", topics: topics_of(scenario) })],

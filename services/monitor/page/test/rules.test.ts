@@ -36,6 +36,7 @@ describe("curvature", () => {
     expect(misfit({ measured: [[0, 1, 1]], map: [] })).toBeNull();
   });
   it("takes what is nearest to the train", () => expect(at_train([[-3, 1], [2, 5], [9, 7]])).toEqual([2, 5]));
+  it("takes nothing that is far from it", () => expect(at_train([[-300, 1], [40, 5]])).toBeUndefined());
 });
 
 describe("plots", () => {

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { age_s, appended, freshness, nothing } from "../src/stale";
+import { age_s, appended, freshness, LinkDelay, nothing } from "../src/stale";
 
 describe("age", () => {
   it("is what the server said plus what passed here", () => {
@@ -8,6 +8,22 @@ describe("age", () => {
   });
   it("does not become negative when a clock is set back", () => expect(age_s({ value: 1, at_ms: 9000 }, 3500)).toBe(0));
   it("is infinite for what never came", () => expect(age_s(nothing(), 3500)).toBe(Infinity));
+});
+
+describe("the link", () => {
+  it("is late by what a message took longer than the quickest", () => {
+    const link = new LinkDelay();
+    expect(link.late_s(5000, 1040)).toBe(0);
+    expect(link.late_s(5100, 1120)).toBe(0);
+    expect(link.late_s(5200, 3220)).toBeCloseTo(2, 2);
+    expect(link.late_s(5300, 3320)).toBeCloseTo(2, 2);
+    link.reset();
+    expect(link.late_s(9000, 100)).toBe(0);
+  });
+  it("bears clocks that drift apart", () => {
+    const link = new LinkDelay();
+    for (let s = 0; s < 36000; ++s) expect(link.late_s(1000 * s, 1000.2 * s)).toBeLessThan(0.01);
+  });
 });
 
 describe("freshness", () => {

@@ -1,6 +1,6 @@
 // The figures a dispatcher reads first.
 import type { ComponentChildren } from "preact";
-import { capital, duration, kmh, metres, number, words } from "../format";
+import { capital, duration, kmh, metres, number, outward, words } from "../format";
 import { age_of, fresh, map, state } from "../store";
 import { is_sure, track_note } from "../track_note";
 import type { TrainState } from "../wire";
@@ -78,7 +78,7 @@ function Where({ one }: { one: TrainState }) {
       <Figure id="position" name={known ? `Position on ${edge_name(one.edge)}` : "Position"} value={known ? number(one.offset_m, 1) : "Unknown"}
         unit={known ? "m" : undefined} note={known ? [reference(one), geo].filter(Boolean).join(" · ") : `${metres(one.distance_m)} since the start`}
         level={known ? "" : "warn"} />
-      <Figure id="interval" name="True position within" value={!bounded ? "Unknown" : `${number(-(one.over_m ?? 0), digits)} / +${number(one.under_m, digits)}`}
+      <Figure id="interval" name="True position within" value={!bounded ? "Unknown" : `${number(-outward(one.over_m, digits), digits)} / +${number(outward(one.under_m, digits), digits)}`}
         unit={bounded ? "m" : undefined} level={bounded ? "" : "warn"}
         note={bounded ? `${metres(one.over_m)} behind to ${metres(one.under_m)} ahead` : "no bound can be given"} />
     </>

@@ -21,11 +21,11 @@ const command = (name: string, argument = "") => send(answer, "recorder", name, 
 function Buttons({ one }: { one: RecorderStatus }) {
   const able = may_control() && !answer.value.busy;
   const state = one.state;
-  const running = state === "recording" || state === "waiting";
+  const running = one.file !== ""; // it may wait for an event without one
   return (
     <div class="buttons" role="group" aria-label="Recorder control">
-      <button disabled={!able || state !== "stopped"} onClick={() => void command("start")}>Start</button>
-      <button disabled={!able || state === "stopped"} onClick={() => void command("stop")}>Stop</button>
+      <button disabled={!able || running} onClick={() => void command("start")}>Start</button>
+      <button disabled={!able || !running} onClick={() => void command("stop")}>Stop</button>
       {state === "paused" ? (
         <button disabled={!able} onClick={() => void command("resume")}>Go on</button>
       ) : (
@@ -40,7 +40,7 @@ function Buttons({ one }: { one: RecorderStatus }) {
       >
         <input aria-label="What happened" placeholder="What happened" maxLength={200} value={event_text.value}
           onInput={(event) => (event_text.value = event.currentTarget.value)} />
-        <button disabled={!able || state === "stopped"}>Mark event</button>
+        <button disabled={!able || (!running && one.ring_s === 0)}>Mark event</button>
       </form>
     </div>
   );
