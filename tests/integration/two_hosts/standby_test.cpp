@@ -199,6 +199,7 @@ TEST_F(StandbyTest, AFusionThatFailsIsFollowedByTheOtherAndComesBackSilently) {
 }
 
 TEST_F(StandbyTest, TheDistanceGoesOnBehindAStandbyThatMeasuresLessOften) {
+  constexpr int64_t kPicturePeriodNs = core::kNsPerSecond / 60;  // each gives a state of the one in charge
   constexpr int64_t kWheelPeriodNs = core::kNsPerSecond / 5;
   const std::string at_begin = "1:" + std::to_string(kBeginM) + ":+";
   auto coach = fusion(TwoHosts::coach, at_begin);
@@ -209,14 +210,19 @@ TEST_F(StandbyTest, TheDistanceGoesOnBehindAStandbyThatMeasuresLessOften) {
   messaging::Writer<msg::WheelSample> wheel(*cab_, topics::wheel_sample);
   int64_t next_wheel_ns = 0;
   const auto with_wheel = [&](auto condition) {
-    return drive([&, condition] {
-      if (core::monotonic_ns() >= next_wheel_ns) {
+    return run_until([&, condition] {
+      const int64_t now_ns = core::monotonic_ns();
+      if (now_ns >= next_picture_ns_) {
+        camera_->step();
+        next_picture_ns_ = now_ns + kPicturePeriodNs;
+      }
+      if (now_ns >= next_wheel_ns) {
         msg::WheelSample sample;
         sample.stamp_ns(core::wall_ns());
         sample.pulses_per_metre(100);
         sample.pulses(static_cast<int64_t>(100 * camera_->way_m()));
         wheel.write(sample);
-        next_wheel_ns = core::monotonic_ns() + kWheelPeriodNs;
+        next_wheel_ns = now_ns + kWheelPeriodNs;
       }
       return condition();
     });
