@@ -18,8 +18,8 @@ constexpr double kKeptM = 200000;
 
 // A train that runs for weeks would take its whole way along.
 void drop_far(Route& route, double near_m) {
-  while (route.legs().front().end_m() < near_m - kKeptM) route.drop_behind();
-  while (route.legs().back().begin_m > near_m + kKeptM) route.drop_ahead();
+  while (route.legs().size() > 1 && route.legs().front().end_m() < near_m - kKeptM) route.drop_behind();
+  while (route.legs().size() > 1 && route.legs().back().begin_m > near_m + kKeptM) route.drop_ahead();
 }
 
 /// Runs after the first until `distance_m` beyond the end of the first is covered or the track ends: over an edge of

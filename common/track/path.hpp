@@ -33,8 +33,8 @@ struct PathSwitch {
   int ways = 2;
 };
 
-/// Distance 0 is where the path was started, which a long one may have left; it is negative behind it. Read-only after it is made; keeps the map
-/// alive.
+/// Distance 0 is where the path was started, which a long one may have left; it is negative behind it. Read-only after
+/// it is made; keeps the map alive.
 class Path {
  public:
   /// Follows the track from `start` (its direction, unknown = forward) over the straight way of every switch, `ahead_m`

@@ -186,7 +186,8 @@ void Estimator::judge_sensors(TrainEstimate& e) const {
   for (int i = 0; i < kSources; ++i) {
     const auto source = static_cast<Source>(i);
     const bool motion = source == Source::camera || source == Source::wheel || source == Source::imu;
-    if (watch(source).used_ns != 0 && !watch(source).isolated && unused_for_s(source) < (motion ? kRecentS : kRecentPositionS))
+    if (watch(source).used_ns != 0 && !watch(source).isolated &&
+        unused_for_s(source) < (motion ? kRecentS : kRecentPositionS))
       e.sources |= 1U << i;
   }
 

@@ -13,8 +13,8 @@ namespace {
 
 constexpr size_t kLeastSeen = 10;
 constexpr size_t kMostSeen = 1000;  // of a train that is moved to and fro
-constexpr double kWayM = 100.0;  // over which GNSS and odometer must agree, ...
-constexpr double kOffM = 10.0;   // ... to this and
+constexpr double kWayM = 100.0;     // over which GNSS and odometer must agree, ...
+constexpr double kOffM = 10.0;      // ... to this and
 constexpr double kOffShare = 0.05;
 constexpr double kRocksM = 2.0;      // a train that stands or begins to move
 constexpr double kStandsM = 1.0;     // since the last position: it takes that one's place
