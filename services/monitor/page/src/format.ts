@@ -15,7 +15,7 @@ export function number(value: number | null | undefined, digits: number): string
 /// A bound that is shown with so many digits must not be less than it is.
 export function outward(value: number | null | undefined, digits: number): number {
   const parts = 10 ** digits;
-  return Math.ceil((value ?? 0) * parts - 1e-6) / parts;
+  return Math.max(0, Math.ceil((value ?? 0) * parts - 1e-6)) / parts;
 }
 
 function with_unit(value: number | null | undefined, digits: number, unit: string): string {

@@ -73,7 +73,8 @@ function take_state(message: Partial<TrainState>): void {
   if (message.edge === undefined) return;
   const at_ms = performance.now();
   const known = message as TrainState;
-  state.value = { value: { ...known, age_s: known.age_s + link.late_s(known.sent_ns / 1e6, at_ms) }, at_ms };
+  const late_s = known.sent_ns === undefined ? 0 : link.late_s(known.sent_ns / 1e6, at_ms); // a monitor before this one
+  state.value = { value: { ...known, age_s: known.age_s + late_s }, at_ms };
 }
 
 /// Called once a second.

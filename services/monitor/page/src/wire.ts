@@ -22,7 +22,7 @@ export interface Place {
 export interface TrainState extends Place {
   stamp_ns: number;
   age_s: number;
-  sent_ns: number; // by the monitor's clock that nobody sets
+  sent_ns?: number; // by the monitor's clock that nobody sets
   distance_m: number | null;
   speed_mps: number | null;
   acceleration_mps2: number | null;

@@ -34,8 +34,14 @@ describe("all is well", () => {
   it("is not said any more when the train falls silent", () => {
     well();
     position({ edge: 1, age_s: 0.1 });
-    position({ age_s: 12 });
+    position({ edge: 1, age_s: 12 });
     expect(said()).toEqual({ level: "old", text: expect.stringMatching(/^Nothing has been heard of the train's position for 12\ss/) });
+  });
+  it("is not said of what has waited on a slow link", () => {
+    well();
+    position({ edge: 1, age_s: 0.1, sent_ns: 1e9 * 5 });
+    position({ edge: 1, age_s: 0.1, sent_ns: 1e9 * 5 - 1e9 * 7 });
+    expect(said()).toEqual({ level: "old", text: expect.stringMatching(/for 7\.[01]\ss/) });
   });
   it("is not said any more when the train falls silent and this browser's clock is set back", () => {
     well();
