@@ -143,14 +143,9 @@ bool Reader::scan(const GoesOn& goes_on) {
   const uint64_t size = bytes_->size();
   while (offset < size) {
     if (goes_on && !goes_on()) return false;
-    const auto head = bytes_->read(offset, std::min<uint64_t>(kRecordHeadBytes, size - offset));
     if (offset + kMagic.size() == size && has_magic(bytes_->read(offset, kMagic.size()))) return true;
-    Decoder decoder(head ? ByteView(*head) : ByteView());
-    const uint8_t opcode = decoder.u8();
-    const uint64_t length = decoder.u64();
-    const bool whole = decoder.ok() && length <= size - offset - kRecordHeadBytes;
-    const auto content = whole ? bytes_->read(offset + kRecordHeadBytes, length) : std::nullopt;
-    if (!content || opcode == 0) {
+    const auto record = record_at(offset);
+    if (!record || record->opcode == 0) {
       const auto next = chunk_behind(offset);
       unread_bytes_ += next.value_or(size) - offset;
       const std::string where = "byte " + std::to_string(offset) + " of " + std::to_string(size);
@@ -163,30 +158,34 @@ bool Reader::scan(const GoesOn& goes_on) {
       offset = *next;
       continue;
     }
-    if (!scan_record(opcode, offset, *content)) {
-      unread_bytes_ += kRecordHeadBytes + length;
+    const uint64_t bytes = kRecordHeadBytes + record->content.size();
+    if (!scan_record(record->opcode, offset, record->content)) {
+      unread_bytes_ += bytes;
       problem("the record at byte " + std::to_string(offset) + " is damaged and left out");
     }
-    if (opcode == static_cast<uint8_t>(Opcode::data_end)) return true;
-    offset += kRecordHeadBytes + length;
+    if (record->opcode == static_cast<uint8_t>(Opcode::data_end)) return true;
+    offset += bytes;
   }
   return true;
+}
+
+std::optional<Reader::Record> Reader::record_at(uint64_t offset) const {
+  const auto head = bytes_->read(offset, kRecordHeadBytes);
+  if (!head) return std::nullopt;
+  Decoder decoder(*head);
+  const uint8_t opcode = decoder.u8();
+  auto content = bytes_->read(offset + kRecordHeadBytes, decoder.u64());
+  return content ? std::optional(Record{opcode, std::move(*content)}) : std::nullopt;
 }
 
 // Where a length is damaged, or a block of the disk, the whole chunks behind it are still there.
 std::optional<uint64_t> Reader::chunk_behind(uint64_t offset) const {
   constexpr uint64_t kBlockBytes = 1U << 20U;
   const auto is_chunk = [&](uint64_t at) {
-    const auto head = bytes_->read(at, kRecordHeadBytes);
-    Decoder decoder(head ? ByteView(*head) : ByteView());
-    const uint8_t opcode = decoder.u8();
-    const uint64_t length = decoder.u64();
-    if (!decoder.ok() || opcode != static_cast<uint8_t>(Opcode::chunk)) return false;
-    if (length > bytes_->size() - at - kRecordHeadBytes) return false;
-    const auto content = bytes_->read(at + kRecordHeadBytes, length);
+    const auto record = record_at(at);
     ChunkHead chunk;
     ByteView stored;
-    return content && parse(*content, chunk, stored) && chunk.crc != 0 && chunk_records(chunk, stored).ok();
+    return record && parse(record->content, chunk, stored) && chunk.crc != 0 && chunk_records(chunk, stored).ok();
   };
   for (uint64_t at = offset + 1; at < bytes_->size(); at += kBlockBytes) {
     const auto block = bytes_->read(at, std::min(kBlockBytes, bytes_->size() - at));

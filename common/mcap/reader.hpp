@@ -96,6 +96,12 @@ class Reader {
   bool read_summary_record(uint8_t opcode, ByteView content, std::vector<MetadataIndex>& metadata);
   /// False: `goes_on` says no.
   bool scan(const GoesOn& goes_on);
+  struct Record {
+    uint8_t opcode = 0;
+    Bytes content;
+  };
+  /// Nothing where no whole one can begin.
+  [[nodiscard]] std::optional<Record> record_at(uint64_t offset) const;
   /// The next place where a whole chunk with a right checksum begins.
   [[nodiscard]] std::optional<uint64_t> chunk_behind(uint64_t offset) const;
   bool scan_record(uint8_t opcode, uint64_t offset, ByteView content);

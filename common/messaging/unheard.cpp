@@ -19,6 +19,12 @@ void sort_out(std::vector<std::string>& sentences) {
   sentences.erase(std::unique(sentences.begin(), sentences.end()), sentences.end());
 }
 
+std::string name_of(const Participant::Impl& inside, const eprosima::fastrtps::rtps::GUID_t& endpoint,
+                    const std::string& otherwise) {
+  const auto known = inside.remote_processes.find(endpoint.guidPrefix);
+  return known == inside.remote_processes.end() ? otherwise : known->second.name;
+}
+
 std::string why_unheard(const Terms& offered, const Terms& wanted, bool layouts_fit) {
   if (!layouts_fit) return ": its release has another layout of this topic (IDL); bring both to one release";
   const auto why = mismatch(offered, wanted);
@@ -40,9 +46,8 @@ std::vector<std::string> unheard_writers(Participant& participant) {
       if (writer.topic != topic) continue;
       const auto why = why_unheard(writer.terms, wanted, fits(layout, inside.layout_of_writer(number_of(guid))));
       if (why.empty()) continue;
-      const auto name = inside.remote_processes.find(guid.guidPrefix);
-      sentences.push_back(topic + (name == inside.remote_processes.end() ? "" : " of " + name->second.name) +
-                          " is not heard" + why);
+      const auto name = name_of(inside, guid, "");
+      sentences.push_back(topic + (name.empty() ? "" : " of " + name) + " is not heard" + why);
     }
   }
   sort_out(sentences);
@@ -60,9 +65,7 @@ std::vector<std::string> unreached_readers(Participant& participant) {
     for (const auto& [guid, reader] : inside.remote_readers) {
       const auto& since_ns = reader.out_of_reach_since_ns;
       if (reader.topic != topic || !since_ns || now_ns - *since_ns < kGoneNs) continue;
-      const auto name = inside.remote_processes.find(guid.guidPrefix);
-      sentences.push_back(topic + " does not reach " +
-                          (name == inside.remote_processes.end() ? "a reader" : name->second.name) +
+      sentences.push_back(topic + " does not reach " + name_of(inside, guid, "a reader") +
                           ": run it as the same user and with this one's /dev/shm");
     }
   }

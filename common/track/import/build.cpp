@@ -11,7 +11,6 @@
 #include "track/import/osm/osm_chains.hpp"
 #include "track/import/osm/osm_network.hpp"
 #include "track/import/scale.hpp"
-#include "track/import/swapped.hpp"
 #include "track/import/told.hpp"
 #include "track/import/whereabouts.hpp"
 #include "track/import/xml/erju.hpp"
@@ -259,15 +258,6 @@ class Sources {
               : "the coordinate system is not known; give --crs to get latitudes and longitudes");
   }
 
-  /// Only where the map's own system says that the tracks are in the wrong place and would be in the right one.
-  [[nodiscard]] std::string told_elsewhere(const Projection& projection) const {
-    const std::optional<GeoPoint> middle = middle_of(osm_);
-    if (!middle || projection.is_made_for(*middle) || !projection.is_made_for(swapped(*middle))) return "";
-    return "the tracks lie around latitude " + told_number(middle->lat_deg, 3) + ", longitude " +
-           told_number(middle->lon_deg, 3) + ", for which " + map_.crs +
-           " is not made, and would lie right the other way round: " + kMayBeSwapped;
-  }
-
   void add_osm() {
     if (osm_.ways.empty())
       throw core::BadInput(
@@ -278,10 +268,12 @@ class Sources {
     if (map_.crs.empty() || map_.crs == "local")
       throw core::BadInput("OpenStreetMap data need a coordinate system; give --crs");
     const Projection projection = core::value_or_throw(Projection::open(map_.crs));
-    const std::string elsewhere = told_elsewhere(projection);
     auto built = build_osm_network(osm_, projection, options_.smooth_m, options_.with_clothoids);
-    if (!built.ok() && !elsewhere.empty()) throw core::BadInput(built.error().message + "; " + elsewhere);
-    if (!elsewhere.empty()) cuts_.push_back(elsewhere);
+    if (!built.ok()) {  // whereabouts_problem() says it of a map
+      const std::optional<GeoPoint> middle = middle_of(osm_);
+      const std::string elsewhere = middle ? told_swapped(*middle, projection, map_.crs) : "";
+      if (!elsewhere.empty()) throw core::BadInput(built.error().message + "; " + elsewhere);
+    }
     OsmNetwork network = core::value_or_throw(std::move(built));
     const bool alone = map_.edges.empty();
     append(network.draft, map_);

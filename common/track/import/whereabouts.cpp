@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "track/import/swapped.hpp"
 #include "track/import/told.hpp"
 
 namespace railfix::track {
@@ -23,7 +24,20 @@ std::optional<Eigen::Vector2d> middle_of(const Map& map) {
   return length_m > 0 ? std::optional<Eigen::Vector2d>(sum / length_m) : std::nullopt;
 }
 
+std::string told_around(const std::string& place, const std::string& crs) {
+  return "the tracks lie around " + place + ", for which " + crs + " is not made";
+}
+
+std::string told_roughly(const GeoPoint& place) {
+  return "latitude " + told_number(place.lat_deg, 3) + ", longitude " + told_number(place.lon_deg, 3);
+}
+
 }  // namespace
+
+std::string told_swapped(const GeoPoint& middle, const Projection& projection, const std::string& crs) {
+  if (projection.is_made_for(middle) || !projection.is_made_for(swapped(middle))) return "";
+  return told_around(told_roughly(middle), crs) + ", and would lie right the other way round: " + kMayBeSwapped;
+}
 
 std::string whereabouts_problem(const Map& map) {
   const auto middle = map.crs.empty() ? std::nullopt : middle_of(map);
@@ -35,12 +49,12 @@ std::string whereabouts_problem(const Map& map) {
     return place && projection.is_made_for(*place, kBeyondDeg);
   };
   const auto place = projection.to_geo(middle->x(), middle->y());
+  if (std::string told = place ? told_swapped(*place, projection, map.crs) : ""; !told.empty()) return told;
   if (fits(place)) return "";
   const bool fits_exchanged = fits(projection.to_geo(middle->y(), middle->x()));
   const std::string around =
-      place ? "latitude " + told_number(place->lat_deg, 3) + ", longitude " + told_number(place->lon_deg, 3)
-            : "easting " + told_m(middle->x(), 0) + ", northing " + told_m(middle->y(), 0);
-  return "the tracks lie around " + around + ", for which " + map.crs + " is not made: " +
+      place ? told_roughly(*place) : "easting " + told_m(middle->x(), 0) + ", northing " + told_m(middle->y(), 0);
+  return told_around(around, map.crs) + ": " +
          (fits_exchanged ? "eastings and northings are exchanged, and the map is a mirror image"
                          : "the coordinates are of another system, or eastings and northings are exchanged");
 }

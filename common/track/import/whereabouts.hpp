@@ -4,8 +4,13 @@
 #include <string>
 
 #include "track/map.hpp"
+#include "track/projection.hpp"
 
 namespace railfix::track {
+
+/// Of tracks that lie around that place; empty but where the system is not made for it, and is for the place that it is
+/// with latitude and longitude exchanged.
+std::string told_swapped(const GeoPoint& middle, const Projection& projection, const std::string& crs);
 
 /// What is wrong with it and why that may be; empty where it lies within a degree of the system's area, or nobody
 /// knows.

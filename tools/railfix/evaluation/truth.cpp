@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "core/quantile.hpp"
 #include "core/time.hpp"
 #include "core/units.hpp"
+#include "evaluation/statistics.hpp"
 
 namespace railfix::evaluation {
 
@@ -16,16 +16,11 @@ using dataset::TruthRow;
 
 namespace {
 
-double median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return core::quantile(values, 0.5);
-}
-
 int64_t longest_step_ns(const std::vector<TruthRow>& rows) {
   std::vector<double> steps;
   for (size_t i = 1; i < rows.size(); ++i)
     steps.push_back(static_cast<double>(rows[i].stamp_ns - rows[i - 1].stamp_ns));
-  return std::max(core::kNsPerSecond, static_cast<int64_t>(3 * median(steps)));
+  return std::max(core::kNsPerSecond, static_cast<int64_t>(3 * summarise(steps).p50));
 }
 
 /// Degrees, or an angle that counts from the east, would put every error along the track across it. A train runs either
@@ -47,7 +42,7 @@ core::Status check_headings(const std::vector<TruthRow>& rows, const std::filesy
     off_rad.push_back(std::acos(std::min(1.0, std::abs(along))));
   }
   if (off_rad.size() < kEnough) return {};
-  const double usual_rad = median(off_rad);
+  const double usual_rad = summarise(off_rad).p50;
   if (usual_rad < kMostRad) return {};
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.2f", usual_rad);

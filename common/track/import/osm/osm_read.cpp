@@ -86,10 +86,9 @@ std::string end_of(const std::filesystem::path& file, size_t bytes) {
 }
 
 /// JOSM keeps what was deleted until it is uploaded, marked in a way that osmium does not read.
-using Deleted = std::unordered_set<int64_t>;
 struct DeletedInJosm {
-  Deleted nodes;
-  Deleted ways;
+  std::unordered_set<int64_t> nodes;
+  std::unordered_set<int64_t> ways;
 };
 DeletedInJosm deleted_in_josm(const std::string& file, const osmium::io::Header& header) {
   DeletedInJosm deleted;

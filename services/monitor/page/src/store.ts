@@ -60,11 +60,11 @@ export const host_ms = (ns: number) => ns / 1e6 + clock_offset_ms.value;
 type Kind = keyof typeof FRESH_S;
 const held: Record<Kind, { value: Held<unknown> }> = { state, curvature, view, services, topics, recorder, player };
 
-export function age_of(kind: Kind): number {
+export function age_of(kind: Kind, at_ms = passed_ms.value): number {
   const one = held[kind].value;
-  return age_s(one, passed_ms.value, kind === "state" ? ((one.value as TrainState | null)?.age_s ?? 0) : 0);
+  return age_s(one, at_ms, kind === "state" ? ((one.value as TrainState | null)?.age_s ?? 0) : 0);
 }
-export const fresh = (kind: Kind): Freshness => freshness(age_of(kind), FRESH_S[kind], connection.value.up);
+export const fresh = (kind: Kind, at_ms = passed_ms.value): Freshness => freshness(age_of(kind, at_ms), FRESH_S[kind], connection.value.up);
 
 const link = new LinkDelay();
 
@@ -79,8 +79,7 @@ function take_state(message: Partial<TrainState>): void {
 
 /// Called once a second.
 export function remember_moment(at_ms: number): void {
-  const age = age_s(state.value, performance.now(), state.value.value?.age_s ?? 0); // also while nobody sees the page
-  const live = freshness(age, FRESH_S.state, connection.value.up) === "live" ? state.value.value : null;
+  const live = fresh("state", performance.now()) === "live" ? state.value.value : null; // also while nobody sees the page
   const moment = { at_ms, speed_mps: live?.speed_mps ?? null, over_m: live?.over_m ?? null, under_m: live?.under_m ?? null };
   history.value = history.value.concat(moment).slice(-HISTORY_LIMIT);
 }
