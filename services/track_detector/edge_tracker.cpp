@@ -84,7 +84,9 @@ void EdgeTracker::remember(const UprightProfile& profile, const LandmarkPicture&
   if (look.step.size() != profile.step.size()) {
     for (Look& any : looks_) {
       any.step.resize(profile.step.size());
-      for (auto& evidence : any.evidence) evidence.resize(profile.step.size());
+      for (auto* rows : {&any.half_step, &any.evidence}) {
+        for (auto& row : *rows) row.resize(profile.step.size());
+      }
     }
   }
   look.way_m = way_m_;
@@ -95,6 +97,7 @@ void EdgeTracker::remember(const UprightProfile& profile, const LandmarkPicture&
   look.curvature_per_m = curvature_per_m_;
   look.eye_lateral_m = picture.pose.lateral_m;
   look.step = profile.step;
+  look.half_step = profile.half_step;
   const int width = static_cast<int>(profile.score.size());
   const int reach = std::max(1, static_cast<int>(std::lround(0.6 * kTolerance / cell_)));
   for (const int sign : {-1, 1}) {

@@ -92,6 +92,7 @@ class EdgeTracker {
     double way_m = 0, x_m = 0, y_m = 0, heading_rad = 0;
     double curvature_per_m = 0, eye_lateral_m = 0;
     std::vector<float> step;
+    std::array<std::vector<float>, 2> half_step;
     std::array<std::vector<float>, 2> evidence;  // 0..1 of an edge that darkens, brightens to the left
   };
   // A look as seen from the newest one.
@@ -136,7 +137,7 @@ class EdgeTracker {
   [[nodiscard]] std::optional<SettledEdge> refine(Spot& spot, int sign) const;
   void add(const Relative& relative, const Fit& fit, Pass& pass, SettledEdge& edge) const;
   void place(const Fit& fit, const Pass& pass, SettledEdge& edge) const;
-  [[nodiscard]] double brightening(double place_m, double wall_m) const;
+  [[nodiscard]] double step_at(double place_m, double wall_m) const;
   [[nodiscard]] static Relative itself(const Look& look) { return {&look, 0, 0, 0, 1, 0}; }
   void settle();
 

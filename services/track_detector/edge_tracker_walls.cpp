@@ -14,6 +14,7 @@ constexpr double kStepM = 0.008;  // half a column of a look at 5 m
 constexpr double kStepTopM = 0.06;
 constexpr double kBesideStep = 0.8;  // of a step is beside it
 constexpr double kClearStep = 3.5;   // grey levels; noise alone comes to 1
+constexpr double kHalfShare = 0.7;   // of a step that half of the rows show: their noise is so much larger
 
 }  // namespace
 
@@ -30,14 +31,15 @@ std::optional<LookAt> EdgeTracker::last_look_at(double place_m, double lateral_m
   return std::nullopt;
 }
 
-// Mean over the near looks, in grey levels, of how much brighter it is beyond a place on a wall than before it.
-double EdgeTracker::brightening(double place_m, double wall_m) const {
+// Mean over the near looks, in grey levels, of how much the brightness steps at a place on a wall.
+double EdgeTracker::step_at(double place_m, double wall_m) const {
   const Look& now = looks_[newest_];
   const double k = now.curvature_per_m;
   const double ahead_m = place_m - now.way_m;
   const double y_m = wall_m + 0.5 * k * ahead_m * ahead_m - now.eye_lateral_m;
   const double x_m = ahead_m - wall_m * k * ahead_m;
   double sum = 0;
+  std::array<double, 2> half_sum{};
   int n = 0;
   for (const Relative& relative : relatives_) {
     if (ahead_m + relative.back_m < 1) continue;
@@ -46,13 +48,17 @@ double EdgeTracker::brightening(double place_m, double wall_m) const {
     if (std::abs(at) < kStepWideShare * widest_) break;
     const double column = at / cell_ + middle_;
     const auto below = static_cast<size_t>(column);
-    const auto& step = relative.look->step;
-    if (column < 0 || below + 1 >= step.size()) continue;
+    if (column < 0 || below + 1 >= relative.look->step.size()) continue;
     const double part = column - static_cast<double>(below);
-    sum += (1 - part) * static_cast<double>(step[below]) + part * static_cast<double>(step[below + 1]);
+    const auto of = [&](const std::vector<float>& step) {
+      return (1 - part) * static_cast<double>(step[below]) + part * static_cast<double>(step[below + 1]);
+    };
+    sum += of(relative.look->step);
+    for (size_t i = 0; i < 2; ++i) half_sum[i] += of(relative.look->half_step[i]);
     ++n;
   }
-  return n < kFewestStepLooks ? 0.0 : (wall_m > 0 ? -sum : sum) / n;
+  const double half = kHalfShare * std::max(std::abs(half_sum[0]), std::abs(half_sum[1]));
+  return n < kFewestStepLooks ? 0.0 : std::max(std::abs(sum), half) / n;
 }
 
 WallSteps EdgeTracker::steps(double wall_m, double from_m, double to_m) const {
@@ -66,7 +72,7 @@ WallSteps EdgeTracker::steps(double wall_m, double from_m, double to_m) const {
   double best_m = 0;
   double least = 0;  // since the last top
   for (double place_m = to_m; place_m > from_m; place_m -= kStepM) {
-    const double step = std::abs(brightening(place_m, wall_m));
+    const double step = step_at(place_m, wall_m);
     if (step > std::max(best, kClearStep) && kBesideStep * step > least) {
       best = step;
       best_m = place_m;

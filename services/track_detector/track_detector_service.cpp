@@ -186,6 +186,7 @@ void TrackDetectorService::find_landmarks(const cv::Mat& grey, const TrackObserv
   picture.pose = observation.shape.camera;
   picture.pitch_sigma_rad = std::sqrt(observation.covariance(1, 1));
   picture.curvature_per_m = observation.shape.curvature_per_m;
+  picture.vertical_curvature_per_m = observation.shape.vertical_curvature_per_m;
   picture.frame_seq = frame.seq();
   picture.grabbed_ns = frame.grabbed_ns();
   for (const Sighting& sighting : finder_->process(picture)) {

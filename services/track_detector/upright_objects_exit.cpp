@@ -145,7 +145,8 @@ void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m, doub
     exits_ = {};
     return;
   }
-  const bool both = first.place_m - other.place_m < kSidesM;
+  const double apart_m = first.place_m - other.place_m;
+  const bool both = apart_m < kSidesM;
   const bool hidden = first.burnt_out && (!both || other.burnt_out);
   double place_m = both ? mean_of_walls_m(exits_[0].place_m, exits_[1].place_m) : first.place_m;
   double sigma_m = std::hypot(kExitSigmaM, both ? 0.0 : kOneSideSigmaM);
@@ -159,6 +160,8 @@ void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m, doub
     place_m = agree ? end->place_m : followed_m;
     sigma_m = agree ? end->sigma_m : std::hypot(kOneEndSigmaM, farther_m);
   }
+  // The other wall ended before: this edge may be of what stands behind the tunnel.
+  if (!both && apart_m < kPanelM) sigma_m = std::hypot(sigma_m, apart_m);
   if (hidden) sigma_m = std::hypot(sigma_m, kHiddenSigmaM);
   objects_.push_back({LandmarkType::portal_out, place_m, 0, sigma_m, first.pictures});
   if (const auto look = tracker.last_look_at(place_m, tunnel_.wall_m[near_wall()])) objects_.back().seen_at(*look);

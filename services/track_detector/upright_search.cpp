@@ -37,7 +37,9 @@ UprightSearch::UprightSearch(const geometry::Intrinsics& camera)
     : lines_(camera), cell_(kCellPx / camera.fu_px), columns_(2 * static_cast<int>(kWidestBearing / cell_) + 1) {
   grey_.create(kRows, columns_, CV_32F);
   step_.create(kRows, columns_, CV_32F);
-  for (auto* row : {&profile_.step, &squared_, &profile_.score}) row->resize(static_cast<size_t>(columns_));
+  for (auto* row : {&profile_.step, &squared_, &profile_.score, &profile_.half_step[0], &profile_.half_step[1]}) {
+    row->resize(static_cast<size_t>(columns_));
+  }
   profile_.cell = cell_;
   found_.reserve(200);
   lean_ = kUpright;
@@ -57,9 +59,18 @@ const std::vector<UprightEdge>& UprightSearch::find(const LandmarkPicture& pictu
   if (clear_[best] < kNothingClear) best = lean_ > kUpright ? lean_ - 1 : std::min(lean_ + 1, kUpright);
   lean_ = best;
   sum_up(lean_of(lean_));
+  sum_up_halves();
   collect();
   pair();
   return found_;
+}
+
+double UprightSearch::slope_of(int row) const {
+  return top_slope_ - (kRows - 1 - row) * kRowSlope;
+}
+
+int UprightSearch::shift_of(int row, double lean) const {
+  return static_cast<int>(std::lround(lean * slope_of(row) / cell_));
 }
 
 void UprightSearch::look(const LandmarkPicture& picture) {
@@ -70,7 +81,7 @@ void UprightSearch::look(const LandmarkPicture& picture) {
   const Eigen::Matrix3d camera_from_track = geometry::rotation_camera_from_track(picture.pose);
   const double right = -0.5 * (columns_ - 1) * cell_;
   for (int row = 0; row < kRows; ++row) {
-    const double slope = top_slope_ - (kRows - 1 - row) * kRowSlope;
+    const double slope = slope_of(row);
     lines_.sample(picture.grey, (camera_from_track * Eigen::Vector3d(1, right, slope)).cast<float>(),
                   (camera_from_track * Eigen::Vector3d(0, cell_, 0)).cast<float>(), columns_, grey_.ptr<float>(row));
   }
@@ -106,8 +117,7 @@ void UprightSearch::sum_up(double lean) {
   std::fill(sum.begin(), sum.end(), 0.0F);
   std::fill(squared_.begin(), squared_.end(), 0.0F);
   for (int row = 0; row < kRows; ++row) {
-    const double slope = top_slope_ - (kRows - 1 - row) * kRowSlope;
-    const int shift = static_cast<int>(std::lround(lean * slope / cell_));
+    const int shift = shift_of(row, lean);
     const float* step = step_.ptr<float>(row);
     const int first = std::max(0, -shift);
     const int last = std::min(columns_, columns_ - shift);
@@ -121,6 +131,20 @@ void UprightSearch::sum_up(double lean) {
     const float mean = sum[c] = sum[c] * (1.0F / kRows);
     const float variance = std::max(0.0F, squared_[c] * (1.0F / kRows) - mean * mean);
     profile_.score[c] = mean / (std::sqrt(variance * (1.0F / kRows)) + kScoreNoise);
+  }
+}
+
+// A wall's end may be brighter than the land behind it and darker than the haze above that: over all rows no step.
+void UprightSearch::sum_up_halves() {
+  for (auto& half : profile_.half_step) std::fill(half.begin(), half.end(), 0.0F);
+  for (int row = 0; row < kRows; ++row) {
+    auto& half = profile_.half_step[2 * row < kRows ? 0 : 1];
+    const int shift = shift_of(row, lean_of(lean_));
+    const float* step = step_.ptr<float>(row);
+    const int last = std::min(columns_, columns_ - shift);
+    for (int c = std::max(0, -shift); c < last; ++c) {
+      half[static_cast<size_t>(c)] += step[c + shift] * (2.0F / kRows);
+    }
   }
 }
 
@@ -165,8 +189,7 @@ void UprightSearch::pair() {
 double UprightSearch::column_grey(int column) const {
   double sum = 0;
   for (int row = 0; row < kRows; ++row) {
-    const double slope = top_slope_ - (kRows - 1 - row) * kRowSlope;
-    const int c = column + static_cast<int>(std::lround(lean_of(lean_) * slope / cell_));
+    const int c = column + shift_of(row, lean_of(lean_));
     sum += static_cast<double>(grey_.ptr<float>(row)[std::clamp(c, 0, columns_ - 1)]);
   }
   return sum / kRows;

@@ -22,11 +22,12 @@ struct UprightEdge {
 
 /// How the brightness steps from bearing to bearing, over the whole band of one picture.
 struct UprightProfile {
-  double cell = 0;           // bearing between two columns
-  double widest = 0;         // largest bearing that the picture shows on both sides
-  double beside_grey = 0;    // mean of what lies far beside the track, of the darker side
-  std::vector<float> step;   // grey levels, brighter on the left positive; from right to left
-  std::vector<float> score;  // the same against its scatter over the rows
+  double cell = 0;                              // bearing between two columns
+  double widest = 0;                            // largest bearing that the picture shows on both sides
+  double beside_grey = 0;                       // mean of what lies far beside the track, of the darker side
+  std::vector<float> step;                      // grey levels, brighter on the left positive; from right to left
+  std::vector<float> score;                     // the same against its scatter over the rows
+  std::array<std::vector<float>, 2> half_step;  // as step, of the lower and of the upper rows alone
   [[nodiscard]] double bearing(double column) const {
     return (column - 0.5 * (static_cast<double>(step.size()) - 1)) * cell;
   }
@@ -47,9 +48,13 @@ class UprightSearch {
   [[nodiscard]] const UprightProfile& profile() const { return profile_; }
 
  private:
+  /// Rise per metre ahead, and how many columns a thing with that lean is moved by.
+  [[nodiscard]] double slope_of(int row) const;
+  [[nodiscard]] int shift_of(int row, double lean) const;
   void look(const LandmarkPicture& picture);
   void differentiate();
   void sum_up(double lean);
+  void sum_up_halves();
   [[nodiscard]] double clearness() const;
   void look_beside();
   void collect();

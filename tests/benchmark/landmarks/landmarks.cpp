@@ -60,6 +60,7 @@ track_detector::LandmarkPicture picture_of(const dataset::Picture& source,
   picture.stamp_ns = source.stamp_ns;
   picture.pose = rails.shape.camera;
   picture.curvature_per_m = rails.shape.curvature_per_m;
+  picture.vertical_curvature_per_m = rails.shape.vertical_curvature_per_m;
   picture.pitch_sigma_rad = std::sqrt(rails.covariance(1, 1));
   return picture;
 }

@@ -22,6 +22,7 @@ struct Corner {
   double place_m, lateral_m, inner_grey, outer_grey, wall_grey = 100, deep_grey = 100;
   double shows_m = 40;  // from nearer than this: it is burnt out until the camera has got used to the light
   double fades_m = 2;   // until nearer than this: the land behind it is as bright
+  double low_grey = 0;  // so much brighter is it within it in the lower rows, and darker in the upper ones
 };
 
 // The corners as seen from way_m: edges as a picture of 640 columns would show them. score_share: less where the ground
@@ -32,6 +33,7 @@ UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector
   profile.cell = 0.002;
   profile.widest = kWidest;
   profile.step.assign(641, 0.0F);
+  for (auto& half : profile.half_step) half.assign(641, 0.0F);
   edges.clear();
   for (const Corner& corner : corners) {
     const double ahead_m = corner.place_m - way_m;
@@ -42,8 +44,10 @@ UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector
     for (int c = 0; c < 641; ++c) {
       const double share = 1 - std::abs(c - profile.column(bearing)) / 2.5;
       if (share <= 0) continue;
-      profile.step[static_cast<size_t>(c)] +=
-          static_cast<float>(side * share * (corner.outer_grey - corner.inner_grey));
+      const double step = corner.outer_grey - corner.inner_grey;
+      profile.step[static_cast<size_t>(c)] += static_cast<float>(side * share * step);
+      profile.half_step[0][static_cast<size_t>(c)] += static_cast<float>(side * share * (step + corner.low_grey));
+      profile.half_step[1][static_cast<size_t>(c)] += static_cast<float>(side * share * (step - corner.low_grey));
     }
   }
   std::sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) { return a.bearing < b.bearing; });
@@ -192,6 +196,24 @@ TEST(Uprights, ATrainThatBacksOverOpenLandAtNightIsNotBetweenWalls) {
     between_walls += objects.lit_walls() ? 1 : 0;
   }
   EXPECT_EQ(between_walls, 0);
+}
+
+TEST(Uprights, TheEndOfAWallBrighterThanLandAndDarkerThanHazeIsThePortalOut) {
+  Corner end{71, 2.7, 206, 206, 206, 200};
+  end.low_grey = 20;
+  const auto told = pass(on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 210, 120, 205, 200}, end}), 80);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 71, 0.08);
+}
+
+TEST(Uprights, AnExitThatTheOtherWallContradictsIsInDoubt) {
+  auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15}, {70, 2.7, 210, 120, 205, 200}});
+  corners.push_back({71.8, 2.7, 210, 150, 210, 200});  // stands behind the end
+  const auto told = pass(corners, 80);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_LT(std::abs(told[1].place_m - 70), 1.5 * told[1].sigma_m);
 }
 
 TEST(Uprights, TheFaintEndOfABrightWallIsThePortalOut) {
