@@ -53,6 +53,16 @@ Status read_wheel(const fs::path& folder, Sensors& sensors) {
   return {};
 }
 
+// Numbers of NMEA's GGA: what is better than a single fix but no RTK is used as one, and what is reckoned, typed in or
+// simulated is no position of the train.
+int fix_of(int64_t quality, CsvTable& table) {
+  constexpr int kFixes[] = {0, 1, 1, 1, 4, 5, 0, 0, 0};
+  if (quality >= 0 && quality < std::ssize(kFixes)) return kFixes[quality];
+  table.refuse("has a fix (" + std::to_string(quality) +
+               ") that is none of 0 (none), 1 (single), 4 (RTK fixed) and 5 (RTK float)");
+  return 0;
+}
+
 Status read_gnss(const fs::path& file, std::vector<GnssRow>& rows) {
   CsvTable table(file);
   const size_t stamp = table.required(kStampNames);
@@ -64,7 +74,7 @@ Status read_gnss(const fs::path& file, std::vector<GnssRow>& rows) {
   while (table.next(stamp)) {
     GnssRow row;
     row.stamp_ns = table.stamp_ns();
-    row.fix = static_cast<int>(table.integer(fix));
+    row.fix = fix_of(table.integer(fix), table);
     row.lat_deg = row.fix == 0 ? table.number_or_nan(lat) : table.finite(lat);
     row.lon_deg = row.fix == 0 ? table.number_or_nan(lon) : table.finite(lon);
     row.alt_m = table.number_or_nan(alt);

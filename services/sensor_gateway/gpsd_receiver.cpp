@@ -66,7 +66,7 @@ class GpsdReceiver final : public LiveSensor {
     }
     const core::HostTime arrival = core::host_time();
     std::vector<Sample> samples;
-    for (const auto& report : reports_.read(std::span(bytes_).first(got.value()), arrival.wall_ns)) {
+    for (const auto& report : reports_.read(std::span(bytes_).first(got.value()), arrival.monotonic_ns)) {
       if (const auto stamp_ns = stamp_of(report, arrival)) {
         samples.emplace_back(report.row);
         std::get<dataset::GnssRow>(samples.back()).stamp_ns = *stamp_ns;

@@ -24,16 +24,19 @@ void GravityWatch::add(const dataset::ImuRow& row) {
   const double gap_s = core::seconds(row.stamp_ns - last_ns_);
   last_ns_ = row.stamp_ns;
   if (!since_ns_ || gap_s < 0 || gap_s > kLongestGapS) {
+    if (told_by_mean_) before_ = cause();
+    told_by_mean_ = false;
     since_ns_ = row.stamp_ns;
     std::copy(std::begin(row.accel_mps2), std::end(row.accel_mps2), mean_mps2_.begin());
     return;
   }
+  told_by_mean_ = core::seconds(row.stamp_ns - *since_ns_) >= kMeanS;
   const double share = 1 - std::exp(-gap_s / kMeanS);
   for (size_t i = 0; i < 3; ++i) mean_mps2_[i] += share * (row.accel_mps2[i] - mean_mps2_[i]);
 }
 
 std::string GravityWatch::cause() const {
-  if (!since_ns_ || core::seconds(last_ns_ - *since_ns_) < kMeanS) return "";
+  if (!told_by_mean_) return before_;
   const double whole_mps2 = std::hypot(mean_mps2_[0], mean_mps2_[1], mean_mps2_[2]);
   if (whole_mps2 < kFreeFallMps2) return "the IMU feels no gravity; it is broken or of another kind";
   if (whole_mps2 < kLeastMps2 || whole_mps2 > kMostMps2)

@@ -23,6 +23,8 @@ class GravityWatch {
  private:
   [[nodiscard]] std::string cause() const;
   std::array<double, 3> mean_mps2_{};  // forward, left, up
+  bool told_by_mean_ = false;          // it is that of so long that it says how the IMU sits
+  std::string before_;                 // cause of the mean before the last gap: no gap turns an IMU round
   std::optional<int64_t> since_ns_;
   int64_t last_ns_ = 0;
 };

@@ -1,6 +1,7 @@
 #include "sensor_gateway/sensor_gateway_service.hpp"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "core/time.hpp"
 #include "service/data_time.hpp"
@@ -13,6 +14,9 @@ constexpr std::chrono::milliseconds kTick{5};  // one IMU sample at 200 Hz
 dataset::Sensors read(const SensorGatewayConfig& config) {
   if (config.is_live()) return {};
   if (config.source.empty()) throw core::BadInput("sensor_gateway.source is empty; give a dataset folder, or live");
+  if (!std::filesystem::exists(config.source)) {
+    throw core::BadInput("sensor_gateway.source: " + config.source + " does not exist; give a dataset folder, or live");
+  }
   auto sensors = core::value_or_throw(dataset::read_sensors(config.source));
   if (!config.imu) sensors.imu.clear();
   if (!config.wheel) sensors.wheel.clear();

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/time.hpp"
+#include "core/train_limits.hpp"
 
 namespace railfix::sensor_gateway {
 namespace {
@@ -113,7 +114,7 @@ void UbxReadings::read_measurements(std::span<const uint8_t> payload, int64_t ar
     const uint32_t type = data >> 24U & 0x3FU;
     if (type == kTick) {
       has_measurements_ = true;
-      add_wheel(data, {data & kTicks, wheel_tag_.ns(tag_ms), arrival_ns}, samples);
+      add_wheel(data, {data & kTicks, tag_ms, wheel_tag_.ns(tag_ms), arrival_ns}, samples);
     } else if (const auto axis = axis_of(type)) {
       has_measurements_ = true;
       if (!imu_ns) imu_ns = imu_tag_.ns(tag_ms);
@@ -140,17 +141,24 @@ void UbxReadings::add_imu(std::vector<Sample>& samples) {
   samples.emplace_back(row);
 }
 
-// The receiver counts up whichever way the train goes, and says which way that is. While the line was cut it counted
-// on, unless it was switched off: then its time did not go on as ours did.
+// While the line was cut or this process held up it counted on, unless it was switched off: then its time did not go on
+// as ours did, and is no longer than we have waited. After a long cut the counter may have gone round.
+bool UbxReadings::counted_on(const Count& count, uint32_t ticks) const {
+  const int64_t ran_ns = count.tag_ns - last_count_->tag_ns;
+  const int64_t waited_ns = count.arrival_ns - last_count_->arrival_ns;
+  const bool as_ours = std::abs(waited_ns - ran_ns) < kSameClockNs;
+  const bool late = ran_ns > 0 && count.tag_ms * kNsPerMs > waited_ns + kSameClockNs;
+  const bool went_round = core::kFastestTrainMps * pulses_per_metre_ * core::seconds(ran_ns) > 0.5 * kTicks;
+  return ticks < kTicks / 2 && (as_ours || late) && !went_round;
+}
+
+// The receiver counts up whichever way the train goes, and says which way that is.
 void UbxReadings::add_wheel(uint32_t data, const Count& count, std::vector<Sample>& samples) {
   if (last_count_) {
     if (count.tag_ns == last_count_->tag_ns) return;
     const uint32_t ticks = (count.ticks - last_count_->ticks) & kTicks;
-    const int64_t ran_ns = count.tag_ns - last_count_->tag_ns;
-    const bool counted_on =
-        ticks < kTicks / 2 && std::abs(count.arrival_ns - last_count_->arrival_ns - ran_ns) < kSameClockNs;
     const int64_t moved = (data & kBackward) != 0 ? -int64_t{ticks} : int64_t{ticks};
-    pulses_ += counted_on ? moved : kLeap;
+    pulses_ += counted_on(count, ticks) ? moved : kLeap;
   }
   last_count_ = count;
   samples.emplace_back(dataset::WheelRow{count.tag_ns, pulses_});

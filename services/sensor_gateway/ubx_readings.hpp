@@ -15,12 +15,15 @@ namespace railfix::sensor_gateway {
 
 class UbxReadings {
  public:
-  /// A count of pulses that was lost shows as a leap of so many, which no train can make.
-  static constexpr int64_t kLeap = 1 << 23;
+  /// A count of pulses that was lost shows as a leap of so many, which no train can make however long it was away.
+  static constexpr int64_t kLeap = int64_t{1} << 40;
 
+  /// Of the wheel; 0 where it is not used.
+  explicit UbxReadings(double pulses_per_metre) : pulses_per_metre_(pulses_per_metre) {}
   /// What came before does not continue on this connection; the count of pulses does.
   void connected();
   /// With stamps in the receiver's time, IMU in its own axes. A wheel's pulses are counted over all connections.
+  /// Arrival on the host's monotonic clock.
   [[nodiscard]] std::vector<Sample> read(std::span<const uint8_t> bytes, int64_t arrival_ns);
   /// Why there may be no samples, for a technician.
   [[nodiscard]] std::string why_silent() const;
@@ -43,14 +46,17 @@ class UbxReadings {
   };
   struct Count {
     uint32_t ticks;
+    uint32_t tag_ms;  // as it stands in the message: since the receiver began
     int64_t tag_ns;
     int64_t arrival_ns;
   };
   size_t read_frame(std::span<const uint8_t> bytes, int64_t arrival_ns, std::vector<Sample>& samples);
   void read_measurements(std::span<const uint8_t> payload, int64_t arrival_ns, std::vector<Sample>& samples);
   void add_imu(std::vector<Sample>& samples);
+  [[nodiscard]] bool counted_on(const Count& count, uint32_t ticks) const;
   void add_wheel(uint32_t data, const Count& count, std::vector<Sample>& samples);
 
+  double pulses_per_metre_;
   std::vector<uint8_t> pending_;
   Tag imu_tag_;
   Tag wheel_tag_;

@@ -20,7 +20,8 @@ class UbxReceiver final : public LiveSensor {
         device_(source.substr(kScheme.size() - 1)),
         config_(config),
         axes_(axes),
-        latency_ns_(core::to_ns(config.line_latency_ms * 1e-3)) {}
+        latency_ns_(core::to_ns(config.line_latency_ms * 1e-3)),
+        readings_(config.wheel == source ? config.wheel_pulses_per_metre : 0) {}
 
   core::Result<std::string> connect() override {
     readings_.connected();
@@ -38,7 +39,7 @@ class UbxReceiver final : public LiveSensor {
       return core::Error{name() + " was unplugged (" + got.error().message + "); check the cable, it is tried again"};
     const core::HostTime arrival = core::host_time();
     std::vector<Sample> samples;
-    for (const auto& sample : readings_.read(std::span(bytes_).first(got.value()), arrival.wall_ns)) {
+    for (const auto& sample : readings_.read(std::span(bytes_).first(got.value()), arrival.monotonic_ns)) {
       if (wanted(sample)) samples.push_back(in_train(sample, arrival));
     }
     return samples;

@@ -39,8 +39,8 @@ void gpsd(Bytes bytes, size_t piece) {
 }
 
 void ubx(Bytes bytes, size_t piece) {
-  UbxReadings whole;
-  UbxReadings cut;
+  UbxReadings whole(50);
+  UbxReadings cut(50);
   const auto samples = all_of(whole, bytes, bytes.size() + 1);
   fuzz::require(samples.size() == all_of(cut, bytes, piece).size(), "pieces change no sample");
   int64_t pulses = 0;

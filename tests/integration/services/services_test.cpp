@@ -145,6 +145,14 @@ TEST(Services, KeysThatCannotWorkTogetherAreRefused) {
   EXPECT_THAT(refused("map_matcher.track.view_from_m=25"), HasSubstr("view_from_m must be less than view_to_m"));
 }
 
+TEST(Services, SensorsOfAFolderThatIsMissingAreRefused) {
+  const auto refused = test::run_program({"railfix-sensor-gateway", "--set", "common.domain=" + std::to_string(kDomain),
+                                          "--set", "sensor_gateway.source=recordings/misspelt"},
+                                         20);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("sensor_gateway.source: recordings/misspelt does not exist; give a dataset"));
+}
+
 INSTANTIATE_TEST_SUITE_P(Railfix, EveryService, ::testing::ValuesIn(service::service_names()),
                          [](const auto& name) { return name.param; });
 

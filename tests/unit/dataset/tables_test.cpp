@@ -144,5 +144,19 @@ TEST_F(TablesTest, FindsTheMapOfADataset) {
   EXPECT_EQ(find_map(root_), railml);
 }
 
+TEST_F(TablesTest, AFixIsOneOfGnss) {
+  const auto fix_read = [this](const std::string& fix) {
+    write("mav0/gnss0/data.csv", "#timestamp [ns],lat_deg,lon_deg,alt_m,hdop,fix\n7,46.7,9.4,900,1.2," + fix + "\n");
+    return read_sensors(root_);
+  };
+  EXPECT_EQ(fix_read("5").value().gnss.at(0).fix, 5);
+  EXPECT_EQ(fix_read("2").value().gnss.at(0).fix, 1) << "differential";
+  EXPECT_EQ(fix_read("6").value().gnss.at(0).fix, 0) << "dead reckoned";
+  for (const std::string wrong : {"260", "-1", "9"}) {
+    ASSERT_FALSE(fix_read(wrong).ok()) << wrong;
+    EXPECT_THAT(fix_read(wrong).error().message, HasSubstr("line 2: has a fix (" + wrong + ") that is none of"));
+  }
+}
+
 }  // namespace
 }  // namespace railfix::dataset

@@ -48,6 +48,9 @@ TEST(GravityWatch, NothingIsSaidBeforeTenSecondsAndAShockIsNone) {
   EXPECT_THAT(after(watch, 0, 9, 9.81, 0, 0), IsEmpty());
   EXPECT_THAT(after(watch, 60, 9, 9.81, 0, 0), IsEmpty()) << "behind a gap it begins anew";
   EXPECT_THAT(after(watch, 69, 3, 9.81, 0, 0), HasSubstr("forward"));
+  for (int i = 0; i < 10; ++i)
+    EXPECT_THAT(after(watch, 80 + 10 * i, 8, 9.81, 0, 0), HasSubstr("forward")) << "no gap turns an IMU round";
+  EXPECT_THAT(after(watch, 200, 15, 0, 0, 9.81), IsEmpty()) << "somebody has";
   GravityWatch shaken;
   EXPECT_THAT(after(shaken, 0, 20, 0, 0, 9.81), IsEmpty());
   EXPECT_THAT(after(shaken, 20, 1, 30, 0, 0), IsEmpty());

@@ -34,7 +34,7 @@ class UbxReadingsTest : public ::testing::Test {
     EXPECT_EQ(got.size(), 1U);
     return got.empty() ? 0 : std::get<dataset::WheelRow>(got[0]).pulses;
   }
-  UbxReadings readings_;
+  UbxReadings readings_{50};
 };
 
 TEST_F(UbxReadingsTest, AFrameOfTheDescription) {
@@ -81,6 +81,27 @@ TEST_F(UbxReadingsTest, WhatAWheelCountedWhileTheLineWasCutIsKnownUnlessItWasSwi
   EXPECT_EQ(pulses_at(2000, 3, false, 41000 * kMs), 5000 + UbxReadings::kLeap) << "its time has begun anew";
   EXPECT_EQ(pulses_at(2100, 7, false, 41100 * kMs), 5004 + UbxReadings::kLeap);
   EXPECT_EQ(pulses_at(2200, 2, false, 41200 * kMs), 5004 + 2 * UbxReadings::kLeap) << "its counter has";
+}
+
+TEST_F(UbxReadingsTest, WhatWasHeldUpIsNoCountThatWasLost) {
+  EXPECT_EQ(pulses_at(60'000, 100), 0);
+  const int64_t held_ns = 62'000 * kMs;  // all that it said meanwhile is read at once
+  for (uint32_t tag_ms = 60'050; tag_ms < 62'000; tag_ms += 50)
+    EXPECT_EQ(pulses_at(tag_ms, tag_ms - 59'900, false, held_ns), tag_ms - 60'000);
+  EXPECT_EQ(pulses_at(62'050, 2150), 2050);
+}
+
+TEST_F(UbxReadingsTest, AReceiverThatWasSwitchedOffRightAfterItBeganLostItsCount) {
+  EXPECT_EQ(pulses_at(1000, 100), 0);
+  readings_.connected();
+  EXPECT_EQ(pulses_at(1500, 140, false, 3'601'000 * kMs), UbxReadings::kLeap);
+}
+
+// At 200 m/s and 50 pulses a metre half its counter is full after seven minutes.
+TEST_F(UbxReadingsTest, ACounterThatMayHaveGoneRoundIsNotBelieved) {
+  EXPECT_EQ(pulses_at(10'000, 100), 0);
+  EXPECT_EQ(pulses_at(420'000, 300), 200);
+  EXPECT_EQ(pulses_at(850'000, 500), 200 + UbxReadings::kLeap);
 }
 
 TEST_F(UbxReadingsTest, TimeTagsGoOnAroundTheirCounter) {
