@@ -20,6 +20,8 @@ constexpr double kStandsM = 0.02;      // in a window
 constexpr double kRatioWalk = 1e-4;    // from window to window
 constexpr double kCreepWalk = 2e-5;
 constexpr double kLagWalkS = 3e-4;
+constexpr double kGrowthSigma = 1e-4;  // two cheap oscillators: 50 ppm each
+constexpr double kGrowthWalk = 1e-7;
 constexpr double kPlayM = 0.005;    // of the wheel's reading, beside its pulses
 constexpr double kWaySigma = 3e-4;  // share of a window's way
 constexpr double kSameGainMps = 0.15;
@@ -34,8 +36,8 @@ constexpr double kJumpShare = 0.2;      // that the size of a jump may be wrong 
 constexpr double kSpeedBackS = 0.3;     // the speed before a jump is that of so long
 constexpr double kSlowMps = 1.0;        // the way of a slower train says no jump
 
-Eigen::Vector3d squares(double ratio, double creep, double lag_s) {
-  return {ratio * ratio, creep * creep, lag_s * lag_s};
+Eigen::Vector4d squares(double ratio, double creep, double lag_s, double growth) {
+  return {ratio * ratio, creep * creep, lag_s * lag_s, growth * growth};
 }
 
 /// Pictures that were left out leave a gap of whole ones.
@@ -48,7 +50,7 @@ bool is_whole(double one_s, double other_s) {
 }  // namespace
 
 CameraLag::CameraLag(double farthest_s) : farthest_s_(farthest_s) {
-  covariance_ = squares(kRatioSigma, kCreepSigma, lag_sigma_s()).asDiagonal();
+  covariance_ = squares(kRatioSigma, kCreepSigma, lag_sigma_s(), kGrowthSigma).asDiagonal();
 }
 
 CameraLag::Lag CameraLag::unknown() {
@@ -174,18 +176,29 @@ void CameraLag::compare() {
   compared_ = true;
 }
 
+// What a standing train knows of the ratio and the creep it still knows when it goes on; the clocks run on.
+void CameraLag::pass(double seconds) {
+  if (covariance_(2, 2) < lag_sigma_s() * lag_sigma_s()) {
+    Eigen::Matrix4d on = Eigen::Matrix4d::Identity();
+    on(2, 3) = seconds;
+    fitted_ = on * fitted_;
+    covariance_ = on * covariance_ * on.transpose();
+  }
+  covariance_.diagonal() += squares(kRatioWalk, kCreepWalk, kLagWalkS, kGrowthWalk);
+}
+
 void CameraLag::fit(const Mark& from, const Mark& to) {
+  pass(core::seconds(to.wheel.at.stamp_ns - from.wheel.at.stamp_ns));
   const double wheel_m = to.wheel.at.way_m - from.wheel.at.way_m;
   if (std::abs(wheel_m) < kStandsM) {
     stood_ = true;
-    return;  // what a train knows it still knows when it goes on
+    return;
   }
   if (std::exchange(stood_, false)) doubt(kStoodSigmaS);
-  covariance_.diagonal() += squares(kRatioWalk, kCreepWalk, kLagWalkS);
   const double gained_mps = to.wheel.speed_mps - from.wheel.speed_mps;
   const double seen_mps = to.camera.speed_mps - from.camera.speed_mps;
   if (std::abs(seen_mps - gained_mps) > kSameGainMps + kSameGain * std::abs(gained_mps)) return;
-  const Eigen::Vector3d by(wheel_m, -gained_mps * wheel_m, -gained_mps);
+  const Eigen::Vector4d by(wheel_m, -gained_mps * wheel_m, -gained_mps, 0);
   const double off_m = to.camera.at.way_m - from.camera.at.way_m - wheel_m - by.dot(fitted_);
   const double noise_m2 = to.camera.at.variance_m2 - from.camera.at.variance_m2 + from.wheel.at.variance_m2 +
                           to.wheel.at.variance_m2 + kWaySigma * kWaySigma * wheel_m * wheel_m;
@@ -195,7 +208,7 @@ void CameraLag::fit(const Mark& from, const Mark& to) {
     return;
   }
   refused_ = 0;
-  const Eigen::Vector3d gain = covariance_ * by / variance;
+  const Eigen::Vector4d gain = covariance_ * by / variance;
   fitted_ += gain * off_m;
   covariance_ -= gain * gain.transpose() * variance;
   if (std::abs(fitted_(2)) > farthest_s_) look_elsewhere();

@@ -14,7 +14,8 @@ namespace railfix::fusion {
 
 /// Fitted to the way of both over windows of a second, beside their ratio and the wheel's creep, which grows with
 /// acceleration and speed. Where both say another change of speed, as in a slip, and where samples come late, nothing
-/// is measured. Stamps that jump on the way, as those of a camera that is started anew, show against the way itself.
+/// is measured. Two clocks that nobody keeps together run apart, which at constant speed looks like a ratio: the lag is
+/// less and less known until the speed changes. Stamps that jump on the way, as those of a camera that is started anew, show against the way itself.
 /// Where no lag of half a second fits one of up to two is looked for, and then again one of half a second: the wheel
 /// may have slipped for long.
 class CameraLag {
@@ -57,6 +58,7 @@ class CameraLag {
   static std::optional<Moving> moving_at(const Readings& readings, int64_t stamp_ns);
   void compare();
   void fit(const Mark& from, const Mark& to);
+  void pass(double seconds);
 
   Readings wheel_;
   Readings seen_;  // variances since the first picture
@@ -67,9 +69,9 @@ class CameraLag {
   bool compared_ = false;
   bool stood_ = false;
   bool has_jumped_ = false;
-  // Ratio of the ways less one, creep (m of way per m and m/s gained), lag (s).
-  Eigen::Vector3d fitted_ = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d covariance_;
+  // Ratio of the ways less one, creep (m of way per m and m/s gained), lag (s), its growth (s/s).
+  Eigen::Vector4d fitted_ = Eigen::Vector4d::Zero();
+  Eigen::Matrix4d covariance_;
   int refused_ = 0;  // in a row
   double farthest_s_ = kUsualS;
 };

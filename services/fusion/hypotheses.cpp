@@ -173,12 +173,14 @@ bool Hypotheses::settle(Doubter& doubter, const Estimator& before, const FixInpu
   if (doubter.of_shape) return of_shape || contradicted;
   if (of_shape && !contradicted) return false;
   const bool enough = contradicted || (++doubter.agreed >= kFixesToSettle && !differs_in_scale(doubter));
+  if (doubter.estimator.fix_sigmas_off(0) < kUnlikelySigmas) return enough;
   const double sigmas = doubter.estimator.fix_sigmas_off(doubter.excused_m);
-  if (sigmas < kUnlikelySigmas) return enough;
   const bool gnss_denies = before.watch(Source::gnss).isolated && !main_.watch(Source::gnss).isolated;
   doubter.estimator = before;
   doubter.against += of_shape ? 0 : 1;
-  const bool outvoted = landmark_evidence(doubter.against) >= evidence_to_settle(sigmas, doubter.confirmed_by);
+  const double needed =
+      sigmas < kUnlikelySigmas ? kExcusedEvidence : evidence_to_settle(sigmas, doubter.confirmed_by);
+  const bool outvoted = landmark_evidence(doubter.against) >= needed;
   return enough && (gnss_denies || outvoted);
 }
 
