@@ -219,7 +219,8 @@ void Estimator::judge_place(TrainEstimate& e) const {
   if (gnss.isolated) e.degrade("GNSS contradicts the position" + since(gnss.changed_ns));
   const bool turned_away = place_.track_doubt.turns_otherwise() && place_.wrong_place.is_no_position();
   e.place_in_doubt = gnss_denies_place() || turned_away || place_.wrong_place.lost();
-  if (gnss_denies_place() || turned_away) e.integrity = Integrity::unusable;
+  const bool slides_unseen = gnss.isolated && gnss_proven() && wheel_is_alone();
+  if (gnss_denies_place() || turned_away || slides_unseen) e.integrity = Integrity::unusable;
   if (doubts_.time_m > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) e.degrade("a position fix was refused");
   if (corrected_) e.degrade("position was corrected by two fixes against the filter");

@@ -284,6 +284,7 @@ class Estimator {
   [[nodiscard]] bool slipped_unseen() const;
   [[nodiscard]] bool wheel_is_alone() const;
   [[nodiscard]] double unwatched_share() const;
+  double speed_changed_alone_mps();
   void restart_wheel(int64_t stamp_ns, double wheel_m, double sigma_m);
   void take_wheel_back(int64_t stamp_ns, double wheel_m, double sigma_m);
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
@@ -376,6 +377,8 @@ class Estimator {
   // What the interval holds beyond the filter's sigma.
   Doubts doubts_;
   Unwatched unwatched_;
+  double alone_slowest_mps_ = 0;  // that the wheel has said since it measures alone
+  double alone_fastest_mps_ = 0;
   double unchecked_m_ = 0;  // of the first step, until a second one or the wheel agrees
   double excess_m_ = 0;     // that others promise beyond this one's interval
   bool unwidened_ = false;  // for the present event

@@ -197,8 +197,10 @@ void Estimator::watch_alone(double way_m, double dt_s) {
   // Nobody else measures for a while, or the wheel came back in the dark, where an IMU alone had said that it is well
   // again: a slip may be no larger than what passes for a change of speed.
   const bool came_back = slipped_unseen() && !sees();
+  const double alone_mps = speed_changed_alone_mps();
   if (is_watched() && (wheel_is_alone() || came_back)) {
-    const double hidden_mps = std::max(kHiddenSlipMps, kHiddenSlipShare * std::abs(filter_.speed_mps()));
+    const double passes_mps = std::max(kHiddenSlipMps, kHiddenSlipShare * std::abs(filter_.speed_mps()));
+    const double hidden_mps = std::max(passes_mps, alone_mps);
     const double more_m = std::min(hidden_mps * dt_s, parameters_->wheel_slip_share * std::abs(way_m));
     const double most_m = std::max(unwatched_.hidden_m, hidden_mps * parameters_->wheel_slip_s);
     unwatched_.hidden_m = std::min(unwatched_.hidden_m + more_m, most_m);
@@ -206,6 +208,15 @@ void Estimator::watch_alone(double way_m, double dt_s) {
   const double share = unwatched_share();
   unwatched_.way_m += share * std::max(std::abs(way_m), std::abs(run_m));
   unwatched_.fastest_mps = std::max(unwatched_.fastest_mps, share * std::abs(filter_.speed_mps()));
+}
+
+// So much a slip may have changed the speed that a wheel alone says: as a train accelerates or brakes, for as long.
+double Estimator::speed_changed_alone_mps() {
+  const double now_mps = std::abs(filter_.speed_mps());
+  if (!wheel_is_alone()) alone_slowest_mps_ = alone_fastest_mps_ = now_mps;
+  alone_slowest_mps_ = std::min(alone_slowest_mps_, now_mps);
+  alone_fastest_mps_ = std::max(alone_fastest_mps_, now_mps);
+  return std::min(alone_fastest_mps_ - alone_slowest_mps_, parameters_->wheel_slip_share * alone_fastest_mps_);
 }
 
 bool Estimator::wheel_is_alone() const {
