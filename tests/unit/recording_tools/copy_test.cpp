@@ -9,8 +9,10 @@
 #include "mcap/check.hpp"
 #include "mcap/writer.hpp"
 #include "messaging/topics.hpp"
+#include "recording/export_csv.hpp"
 #include "recording/repair.hpp"
 #include "recording/standing_values.hpp"
+#include "support/other_writers_file.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -258,6 +260,25 @@ TEST_F(Copy, OneRecordingIsOneTrains) {
   const auto itself = merge_recordings({a_, a_}, a_);
   ASSERT_FALSE(itself.ok());
   EXPECT_THAT(itself.error().message, HasSubstr("is one of the recordings"));
+}
+
+TEST_F(Copy, NothingOfOtherWritersFilesIsLost) {
+  for (unsigned bits = 0; bits < test::OtherSummary::kCombinations; ++bits) {
+    const auto bytes = test::other_writers_file(test::OtherSummary(bits));
+    std::ofstream(a_, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    const auto made = [&](const std::string& name) { return folder_ / (std::to_string(bits) + name); };
+    ASSERT_TRUE(merge_recordings({a_}, made("merged.mcap")).ok());
+    ASSERT_TRUE(cut_recording(a_, made("cut.mcap"), {0, std::numeric_limits<double>::infinity(), {}, {}}).ok());
+    ASSERT_TRUE(repair_recording(a_, made("repaired.mcap")).ok()) << bits;
+    for (const char* name : {"merged.mcap", "cut.mcap", "repaired.mcap"}) {
+      EXPECT_EQ(content(made(name)).size(), test::kOtherSamples) << bits << name;
+    }
+    auto reader = mcap::Reader::open(a_).value();
+    const auto tables = export_csv(*reader, {}, made("tables"));
+    ASSERT_TRUE(tables.ok()) << tables.error().message;
+    EXPECT_EQ(tables.value().rows, test::kOtherSamples) << bits;
+  }
 }
 
 }  // namespace
