@@ -269,7 +269,9 @@ TEST_F(Copy, NothingOfOtherWritersFilesIsLost) {
     const auto made = [&](const std::string& name) { return folder_ / (std::to_string(bits) + name); };
     ASSERT_TRUE(merge_recordings({a_}, made("merged.mcap")).ok());
     ASSERT_TRUE(cut_recording(a_, made("cut.mcap"), {0, std::numeric_limits<double>::infinity(), {}, {}}).ok());
-    ASSERT_TRUE(repair_recording(a_, made("repaired.mcap")).ok()) << bits;
+    const auto repaired = repair_recording(a_, made("repaired.mcap"));
+    ASSERT_TRUE(repaired.ok()) << repaired.error().message;
+    EXPECT_EQ(repaired.value().lost.samples, 0U) << bits;
     for (const char* name : {"merged.mcap", "cut.mcap", "repaired.mcap"}) {
       EXPECT_EQ(content(made(name)).size(), test::kOtherSamples) << bits << name;
     }
