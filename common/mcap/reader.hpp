@@ -107,6 +107,8 @@ class Reader {
   void read_metadata(const std::vector<MetadataIndex>& indexes);
   /// False: `goes_on` says no.
   bool scan(const GoesOn& goes_on);
+  /// The same; to the next whole chunk, or the end.
+  bool skip_damage(uint64_t& offset, const GoesOn& goes_on);
   struct Record {
     uint8_t opcode = 0;
     Bytes content;

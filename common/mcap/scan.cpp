@@ -17,7 +17,7 @@ constexpr uint64_t kMostChunkHeadBytes = kRecordHeadBytes + 40 + 4;
 /// claims the rest of the file: whole chunks are read only where this is true.
 bool may_be_chunk(ByteView bytes, uint64_t left_in_file) {
   if (bytes.front() != static_cast<uint8_t>(Opcode::chunk)) return false;
-  Decoder decoder(bytes);
+  Decoder decoder(bytes.first(std::min<uint64_t>(bytes.size(), kMostChunkHeadBytes)));
   (void)decoder.u8();
   const uint64_t length = decoder.u64();
   if (!decoder.ok() || length > left_in_file - kRecordHeadBytes) return false;
@@ -37,21 +37,7 @@ bool Reader::scan(const GoesOn& goes_on) {
     if (offset + kMagic.size() == size && bytes_->has_magic(offset)) return true;
     const auto record = record_at(offset);
     if (!record || record->opcode == 0) {
-      bool stopped = false;
-      const auto next = chunk_behind(offset, [&] {
-        stopped = goes_on && !goes_on();
-        return !stopped;
-      });
-      if (stopped) return false;
-      unread_bytes_ += next.value_or(size) - offset;
-      const std::string where = "byte " + std::to_string(offset) + " of " + std::to_string(size);
-      if (!next) {
-        problem("ends in the middle of a record at " + where);
-        return true;
-      }
-      problem("no record begins at " + where + ", where one should; goes on with the chunk at byte " +
-              std::to_string(*next));
-      offset = *next;
+      if (!skip_damage(offset, goes_on)) return false;
       continue;
     }
     const uint64_t bytes = kRecordHeadBytes + record->content.size();
@@ -62,6 +48,23 @@ bool Reader::scan(const GoesOn& goes_on) {
     if (record->opcode == static_cast<uint8_t>(Opcode::data_end)) return true;
     offset += bytes;
   }
+  return true;
+}
+
+bool Reader::skip_damage(uint64_t& offset, const GoesOn& goes_on) {
+  bool stopped = false;
+  const auto next = chunk_behind(offset, [&] {
+    stopped = goes_on && !goes_on();
+    return !stopped;
+  });
+  if (stopped) return false;
+  const uint64_t size = bytes_->size();
+  const std::string where = "byte " + std::to_string(offset) + " of " + std::to_string(size);
+  problem(next ? "no record begins at " + where + ", where one should; goes on with the chunk at byte " +
+                     std::to_string(*next)
+               : "ends in the middle of a record at " + where);
+  unread_bytes_ += next.value_or(size) - offset;
+  offset = next.value_or(size);
   return true;
 }
 
