@@ -11,8 +11,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr size_t kEncapsulationBytes = 4;
-// Types may nest through sequences; a hostile schema must not exhaust the stack.
-constexpr int kDeepest = 32;
 
 struct DecodeError {
   std::string message;
@@ -41,8 +39,7 @@ class Decoder {
   Decoder(const Types& types, std::span<const uint8_t> body, bool big_endian, const DecodeOptions& options)
       : types_(types), body_(body), swap_(big_endian != (std::endian::native == std::endian::big)), options_(options) {}
 
-  ordered_json structure(const Structure& type, int depth) {
-    if (depth > kDeepest) throw DecodeError{"the types nest too deeply"};
+  ordered_json structure(const Structure& type, size_t depth) {
     ordered_json object = ordered_json::object();
     for (const Member& member : type.members) {
       const size_t outer = where_.size();
@@ -79,12 +76,13 @@ class Decoder {
     return std::bit_cast<T>(ordered);
   }
 
-  ordered_json array(const Type& type, size_t dimension, int depth) {
+  ordered_json array(const Type& type, size_t dimension, size_t depth) {
+    if (depth > kDeepest) throw DecodeError{"the types nest too deeply"};
     if (dimension == type.dimensions.size()) return value(type, depth);
     const uint64_t count = type.dimensions[dimension];
     const bool last = dimension + 1 == type.dimensions.size();
     if (last && type.kind == Kind::octet) return hex_text(bytes(count), options_.octets_shown);
-    return elements(count, [&] { return array(type, dimension + 1, depth); });
+    return elements(count, [&] { return array(type, dimension + 1, depth + 1); });
   }
 
   template <class Read>
@@ -96,7 +94,7 @@ class Decoder {
     return list;
   }
 
-  ordered_json sequence(const Type& type, int depth) {
+  ordered_json sequence(const Type& type, size_t depth) {
     const uint64_t count = number<uint32_t>();
     if (type.bound != 0 && count > type.bound) {
       throw DecodeError{where_ + " says " + std::to_string(count) + " elements, but at most " +
@@ -105,7 +103,7 @@ class Decoder {
     if (type.element->kind == Kind::octet && type.element->dimensions.empty()) {
       return hex_text(bytes(count), options_.octets_shown);
     }
-    return elements(count, [&] { return array(*type.element, 0, depth); });
+    return elements(count, [&] { return array(*type.element, 0, depth + 1); });
   }
 
   ordered_json text(const Type& type) {
@@ -119,7 +117,7 @@ class Decoder {
     return printable(characters);
   }
 
-  ordered_json value(const Type& type, int depth) {
+  ordered_json value(const Type& type, size_t depth) {
     switch (type.kind) {
       case Kind::boolean:
         return number<uint8_t>() != 0;

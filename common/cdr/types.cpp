@@ -16,6 +16,16 @@ struct SyntaxError {
   std::string message;
 };
 
+void refuse_beyond_deepest(size_t depth, const std::string& of_what) {
+  if (depth > kDeepest) throw SyntaxError{"more than " + std::to_string(kDeepest) + " " + of_what};
+}
+
+size_t sequences_in(const Type& type) {
+  size_t count = 0;
+  for (const Type* one = &type; one->kind == Kind::sequence; one = one->element.get()) ++count;
+  return count;
+}
+
 std::optional<Kind> simple_kind(const std::string& words) {
   static const std::map<std::string, Kind> kinds{{"boolean", Kind::boolean}, {"octet", Kind::octet},
                                                  {"uint8", Kind::octet},     {"char", Kind::character},
@@ -91,7 +101,11 @@ class Parser {
   bool annotations() {
     bool key = false;
     while (accept("@")) {
-      key = name() == "key" || key;
+      const std::string annotation = name();
+      if (annotation == "optional" || annotation == "bit_bound") {
+        throw SyntaxError{"@" + annotation + " is not supported; it changes how the samples are laid out"};
+      }
+      key = annotation == "key" || key;
       if (!accept("(")) continue;
       for (int depth = 1; depth > 0;) {
         if (now().kind == Token::Kind::end) throw SyntaxError{"an annotation does not end"};
@@ -114,10 +128,9 @@ class Parser {
     } else if (what == "enum") {
       enumeration();
     } else if (what == "typedef") {
-      Type type = type_name();
+      const Type type = type_name();
       const std::string alias = full(name());
-      type.dimensions = dimensions();
-      types_.aliases_[alias] = type;
+      types_.aliases_[alias] = array_of(type);
     } else {
       throw SyntaxError{"'" + what + "' is not understood; module, const, struct, enum or typedef expected"};
     }
@@ -125,11 +138,13 @@ class Parser {
   }
 
   void module() {
+    refuse_beyond_deepest(++depth_, "modules stand in each other");
     const std::string outer = scope_;
     scope_ = full(name());
     (void)expect("{");
     while (!accept("}")) definition();
     scope_ = outer;
+    --depth_;
   }
 
   void constant() {
@@ -178,13 +193,26 @@ class Parser {
     return static_cast<uint64_t>(value);
   }
 
-  std::vector<uint64_t> dimensions() {
+  /// The type with the dimensions that stand here; those of a typedef that is an array itself are the inner ones.
+  Type array_of(Type type) {
     std::vector<uint64_t> all;
     while (accept("[")) {
       all.push_back(size());
       (void)expect("]");
     }
-    return all;
+    all.insert(all.end(), type.dimensions.begin(), type.dimensions.end());
+    refuse_beyond_deepest(all.size(), "dimensions in one array");
+    type.dimensions = std::move(all);
+    return type;
+  }
+
+  std::shared_ptr<const Type> element() {
+    (void)expect("<");
+    refuse_beyond_deepest(++depth_, "sequences stand in each other");
+    auto type = std::make_shared<const Type>(type_name());
+    refuse_beyond_deepest(sequences_in(*type) + 1, "sequences stand in each other");  // typedefs hide them
+    --depth_;
+    return type;
   }
 
   Type type_name() {
@@ -199,8 +227,7 @@ class Parser {
     if (words == "string" || words == "sequence") {
       type.kind = words == "string" ? Kind::text : Kind::sequence;
       if (type.kind == Kind::sequence) {
-        (void)expect("<");
-        type.element = std::make_shared<const Type>(type_name());
+        type.element = element();
         if (accept(",")) type.bound = size();
         (void)expect(">");
       } else if (accept("<")) {
@@ -250,12 +277,8 @@ class Parser {
     const Type type = type_name();
     const size_t first = into.members.size();
     do {
-      Member made{name(), type, key, "", "", false};
-      // An array of a typedef that is an array: the outer dimensions come first.
-      std::vector<uint64_t> all = dimensions();
-      all.insert(all.end(), type.dimensions.begin(), type.dimensions.end());
-      made.type.dimensions = std::move(all);
-      into.members.push_back(std::move(made));
+      const std::string member_name = name();
+      into.members.push_back({member_name, array_of(type), key, "", "", false});
     } while (accept(","));
     const std::string comment = expect(";").comment;
     for (size_t i = first; i < into.members.size(); ++i) {
@@ -269,6 +292,7 @@ class Parser {
   std::vector<Token> tokens_;
   size_t position_ = 0;
   std::string scope_;
+  size_t depth_ = 0;  // of modules and sequences around this place
 };
 
 core::Status Types::add(std::string_view idl_text) {

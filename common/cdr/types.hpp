@@ -1,9 +1,10 @@
 // Message types as their IDL text describes them, read at run time: what is needed to take a recorded or live sample
 // apart without code generated for it. Understands the part of OMG IDL 4.2 that data types use: modules, constants,
-// structures, enumerations, typedefs, bounded and unbounded strings and sequences, arrays; annotations are skipped
-// except @key.
+// structures, enumerations, typedefs, bounded and unbounded strings and sequences, arrays. Of the annotations @key
+// counts, those that change a sample's bytes (@optional, @bit_bound) are refused and the others skipped.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -14,6 +15,10 @@
 #include "core/result.hpp"
 
 namespace railfix::cdr {
+
+/// Modules, sequences, dimensions, and in samples structures with all of these: a hostile text must not exhaust the
+/// stack.
+inline constexpr size_t kDeepest = 32;
 
 enum class Kind {
   boolean,

@@ -113,8 +113,25 @@ class MqttClient::Connection {
     return "TLS of the ground link: " + core::joined(named) + ": " + text_of(code) + "; are they PEM?";
   }
 
+  void subscribe() {
+    const int code = mosquitto_subscribe(client_.get(), nullptr, options_.subscribe_to.c_str(), kQos1);
+    if (code != MOSQ_ERR_SUCCESS) give_up_subscription(text_of(code));
+  }
+
+  // Without it nothing would ever come over this connection.
+  void give_up_subscription(const std::string& why) {
+    refusal_ = "it refuses the subscription to \"" + options_.subscribe_to + "\": " + why;
+    mosquitto_disconnect(client_.get());
+  }
+
+  void established() {
+    retry_s_ = kFirstRetryS;
+    connected_ = true;
+    if (events_.connected) events_.connected(version_);
+  }
+
   void set_callbacks() {
-    mosquitto_connect_callback_set(client_.get(), [](mosquitto* client, void* self, int code) {
+    mosquitto_connect_callback_set(client_.get(), [](mosquitto*, void* self, int code) {
       auto& connection = *static_cast<Connection*>(self);
       if (code != 0) {
         connection.refusal_ = refusal_text(code);
@@ -122,11 +139,19 @@ class MqttClient::Connection {
             code == CONNACK_REFUSED_PROTOCOL_VERSION || code == MQTT_RC_UNSUPPORTED_PROTOCOL_VERSION;
         return;
       }
-      connection.retry_s_ = kFirstRetryS;
-      connection.connected_ = true;
-      const auto& filter = connection.options_.subscribe_to;
-      if (!filter.empty()) mosquitto_subscribe(client, nullptr, filter.c_str(), kQos1);
-      if (connection.events_.connected) connection.events_.connected(connection.version_);
+      if (connection.options_.subscribe_to.empty()) {
+        connection.established();
+      } else {
+        connection.subscribe();
+      }
+    });
+    mosquitto_subscribe_callback_set(client_.get(), [](mosquitto*, void* self, int, int count, const int* granted) {
+      auto& connection = *static_cast<Connection*>(self);
+      if (count > 0 && granted[0] >= kFirstFailure) {
+        connection.give_up_subscription(refusal_text(granted[0]));
+      } else {
+        connection.established();
+      }
     });
     mosquitto_disconnect_callback_set(client_.get(), [](mosquitto*, void* self, int code) {
       if (code >= kFirstFailure) static_cast<Connection*>(self)->refusal_ = refusal_text(code);

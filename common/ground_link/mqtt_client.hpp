@@ -26,14 +26,14 @@ struct MqttOptions {
   std::string password;
   int keep_alive_s = 10;        // a silent broker is given up after one and a half of it
   double longest_retry_s = 10;  // attempts begin 0.1 s apart, each pause is twice the one before
-  std::string subscribe_to;     // topic filter, QoS 1; empty = none
+  std::string subscribe_to;     // topic filter, QoS 1; empty = none; refused, it breaks the connection
 };
 
 enum class MqttVersion : uint8_t { v3_1_1 = 4, v5 = 5 };
 
 /// Called in the client's own thread.
 struct MqttEvents {
-  std::function<void(MqttVersion)> connected;
+  std::function<void(MqttVersion)> connected;                // and subscribed, if there is a filter
   std::function<void(const std::string& why)> disconnected;  // also after every attempt that failed
   std::function<void(int id)> delivered;                     // the broker has it
   /// The broker has it not, and does not want it. Version 3.1.1 has no words for that: there it is `delivered`.

@@ -12,6 +12,8 @@ namespace {
 // A length field can be garbage: no chunk of ours comes near this, and a reader must not ask for terabytes.
 constexpr uint64_t kLargestChunkBytes = uint64_t{512} << 20U;
 
+constexpr const char* kOtherSize = "it unpacks to another size than it says";
+
 Bytes compress_zstd(ByteView bytes, int level) {
   Bytes packed(ZSTD_compressBound(bytes.size()));
   const size_t size = ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), level);
@@ -80,23 +82,30 @@ Bytes compress(ByteView bytes, Compression compression, int zstd_level) {
   return packed;
 }
 
-core::Result<Bytes> chunk_records(const ChunkHead& head, ByteView stored_records) {
+core::Status check_head(const ChunkHead& head, uint64_t stored_bytes) {
   if (head.uncompressed_bytes > kLargestChunkBytes) {
     return core::Error{"it claims to unpack to " + std::to_string(head.uncompressed_bytes) + " bytes"};
   }
+  if (head.compression.empty() && stored_bytes != head.uncompressed_bytes) return core::Error{kOtherSize};
+  if (!head.compression.empty() && head.compression != "zstd" && head.compression != "lz4") {
+    return core::Error{"its compression '" + head.compression + "' is not one that Railfix reads (zstd, lz4 or none)"};
+  }
+  return {};
+}
+
+core::Result<Bytes> chunk_records(const ChunkHead& head, ByteView stored_records) {
+  if (const auto possible = check_head(head, stored_records.size()); !possible.ok()) return possible.error();
   Bytes records;
   if (head.compression.empty()) {
     records.assign(stored_records.begin(), stored_records.end());
-  } else if (head.compression == "zstd" || head.compression == "lz4") {
+  } else {
     records.resize(head.uncompressed_bytes);
     const auto size =
         head.compression == "zstd" ? decompress_zstd(stored_records, records) : decompress_lz4(stored_records, records);
     if (!size.ok()) return size.error();
     records.resize(size.value());
-  } else {
-    return core::Error{"its compression '" + head.compression + "' is not one that Railfix reads (zstd, lz4 or none)"};
   }
-  if (records.size() != head.uncompressed_bytes) return core::Error{"it unpacks to another size than it says"};
+  if (records.size() != head.uncompressed_bytes) return core::Error{kOtherSize};
   if (head.crc != 0 && crc32(records) != head.crc) return core::Error{"its checksum is wrong"};
   return records;
 }

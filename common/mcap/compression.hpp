@@ -18,6 +18,9 @@ const char* name_of(Compression compression);
 /// time, above 3 gains little on CDR samples.
 Bytes compress(ByteView bytes, Compression compression, int zstd_level = 1);
 
+/// Whether a chunk with this head can be unpacked, as far as that tells; the error is a clause.
+core::Status check_head(const ChunkHead& head, uint64_t stored_bytes);
+
 /// The records of a chunk, decompressed and checked against its CRC; the error is a clause ("its checksum is wrong").
 core::Result<Bytes> chunk_records(const ChunkHead& head, ByteView stored_records);
 

@@ -10,7 +10,8 @@ Losses losses_of(const Reader& damaged, uint64_t messages) {
   losses.bytes = damaged.unread_bytes();
   for (const auto& [place, bytes] : damaged.lost_chunks()) losses.bytes += bytes;
   const uint64_t counted = damaged.statistics().messages;
-  if (damaged.indexed()) losses.samples = counted - std::min(counted, messages);
+  const bool whole = damaged.closed() && losses.bytes == 0;  // by an index or without one
+  if (damaged.indexed() || whole) losses.samples = counted - std::min(counted, messages);
   return losses;
 }
 

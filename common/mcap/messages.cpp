@@ -50,6 +50,11 @@ std::optional<Bytes> FileBytes::read(uint64_t offset, uint64_t length) const {
   return bytes;
 }
 
+bool FileBytes::has_magic(uint64_t offset) const {
+  const auto bytes = read(offset, kMagic.size());
+  return bytes && std::ranges::equal(*bytes, kMagic);
+}
+
 bool being_written(const std::filesystem::path& file) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return false;
@@ -83,9 +88,10 @@ bool Messages::wanted(const Message& message) const {
 }
 
 void Messages::open(uint64_t place) {
-  auto records = reader_.load(reader_.places_[place]);
+  const uint64_t free_bytes = selection_.most_held_bytes - std::min(held_bytes_, selection_.most_held_bytes);
+  auto records = reader_.load(reader_.places_[place], free_bytes);
   if (!records) return;
-  Loaded loaded{std::move(*records), 0};
+  Loaded loaded{std::move(*records)};
   Decoder decoder(loaded.records);
   while (decoder.left() > 0) {
     const size_t position = decoder.position();
@@ -102,12 +108,20 @@ void Messages::open(uint64_t place) {
     std::ranges::push_heap(heap_, Behind{selection_.backwards});
     ++loaded.left;
   }
-  if (loaded.left > 0) loaded_.emplace(place, std::move(loaded));
+  if (loaded.left == 0) return;
+  loaded.held_bytes = loaded.records.size() + loaded.left * sizeof(Entry);
+  held_bytes_ += loaded.held_bytes;
+  loaded_.emplace(place, std::move(loaded));
+}
+
+void Messages::close(uint64_t place) {
+  const auto loaded = loaded_.find(place);
+  held_bytes_ -= loaded->second.held_bytes;
+  loaded_.erase(loaded);
 }
 
 std::optional<Message> Messages::next() {
-  if (finished_) loaded_.erase(*finished_);
-  finished_.reset();
+  if (finished_) close(*std::exchange(finished_, std::nullopt));
   while (!heap_.empty()) {
     std::ranges::pop_heap(heap_, Behind{selection_.backwards});
     const Entry entry = heap_.back();
@@ -122,7 +136,7 @@ std::optional<Message> Messages::next() {
     (void)parse(decoder.raw(decoder.u64()), message);
     if (--loaded.left == 0) finished_ = entry.place;
     if (channels_.contains(message.channel_id)) return message;
-    if (finished_) loaded_.erase(*std::exchange(finished_, std::nullopt));
+    if (finished_) close(*std::exchange(finished_, std::nullopt));
   }
   return std::nullopt;
 }

@@ -1,6 +1,7 @@
 #include "mcap/reader.hpp"
 
 #include <algorithm>
+#include <ranges>
 
 #include "mcap/compression.hpp"
 #include "mcap/losses.hpp"
@@ -15,10 +16,6 @@ constexpr uint64_t kMostMetadataBytes = uint64_t{1} << 24U;
 // Gigabytes forced to the disk at once would hold up who else writes there.
 constexpr double kRecoverySyncS = 1;
 
-bool has_magic(const std::optional<Bytes>& bytes) {
-  return bytes && std::ranges::equal(*bytes, kMagic);
-}
-
 core::Error stopped(const std::filesystem::path& file) {
   return core::Error{"reading " + file.string() + " was stopped"};
 }
@@ -29,7 +26,7 @@ core::Result<std::unique_ptr<Reader>> Reader::open(const std::filesystem::path& 
   auto bytes = FileBytes::open(file);
   if (!bytes.ok()) return bytes.error();
   std::unique_ptr<Reader> reader(new Reader(file, bytes.value()));
-  if (!has_magic(reader->bytes_->read(0, kMagic.size()))) {
+  if (!reader->bytes_->has_magic(0)) {
     return core::Error{file.string() + (reader->bytes_->size() == 0 ? " is empty" : " is not an MCAP recording") +
                        "; give a file that the recorder wrote"};
   }
@@ -70,9 +67,10 @@ bool Reader::learn(uint8_t opcode, ByteView content) {
   return true;
 }
 
-bool Reader::read_summary_record(uint8_t opcode, ByteView content, std::vector<MetadataIndex>& metadata) {
+bool Reader::read_summary_record(uint8_t opcode, ByteView content, Summary& summary) {
   switch (static_cast<Opcode>(opcode)) {
     case Opcode::statistics:
+      summary.counted = true;
       return parse(content, statistics_);
     case Opcode::chunk_index: {
       ChunkIndex index;
@@ -84,7 +82,7 @@ bool Reader::read_summary_record(uint8_t opcode, ByteView content, std::vector<M
     case Opcode::metadata_index: {
       MetadataIndex index;
       if (!parse(content, index)) return false;
-      metadata.push_back(index);
+      summary.metadata.push_back(index);
       return true;
     }
     default:
@@ -94,7 +92,7 @@ bool Reader::read_summary_record(uint8_t opcode, ByteView content, std::vector<M
 
 bool Reader::read_summary() {
   const uint64_t size = bytes_->size();
-  if (size < kMagic.size() + kTailBytes || !has_magic(bytes_->read(size - kMagic.size(), kMagic.size()))) {
+  if (size < kMagic.size() + kTailBytes || !bytes_->has_magic(size - kMagic.size())) {
     problem("was not closed properly, so it is read by a scan; what the recorder had not yet written is missing");
     return false;
   }
@@ -106,27 +104,47 @@ bool Reader::read_summary() {
     problem("its footer is damaged, so it is read by a scan");
     return false;
   }
-  if (footer.summary_start == 0) return false;  // legal: a file without an index
-  const auto summary = bytes_->read(footer.summary_start, size - kMagic.size() - footer.summary_start);
-  if (!summary) return false;
-  const ByteView checked = ByteView(*summary).first(summary->size() - 4);
+  closed_ = footer.summary_start == 0;
+  if (closed_) return false;  // legal: a file without an index
+  const auto bytes = bytes_->read(footer.summary_start, size - kMagic.size() - footer.summary_start);
+  if (!bytes) return false;
+  const ByteView checked = ByteView(*bytes).first(bytes->size() - 4);
   if (footer.summary_crc != 0 && crc32(checked) != footer.summary_crc) {
     problem("the checksum of its index is wrong, so it is read by a scan");
     return false;
   }
   Decoder decoder(checked.first(footer_offset - footer.summary_start));
-  std::vector<MetadataIndex> metadata_indexes;
+  Summary summary;
   while (decoder.left() > 0) {
     const uint8_t opcode = decoder.u8();
     const ByteView content = decoder.raw(decoder.u64());
-    if (!decoder.ok() || !read_summary_record(opcode, content, metadata_indexes)) {
+    if (!decoder.ok() || !read_summary_record(opcode, content, summary)) {
       problem("its index is damaged, so it is read by a scan");
       return false;
     }
   }
-  if (places_.empty() && statistics_.messages > 0) return false;  // its messages stand outside chunks
+  closed_ = true;
+  if (!suffices(summary)) return false;
   std::ranges::sort(places_, {}, &ChunkPlace::offset);
-  for (const MetadataIndex& index : metadata_indexes) {
+  read_metadata(summary.metadata);
+  return true;
+}
+
+// The format lets a writer leave out almost everything, and without an index messages may stand outside chunks.
+bool Reader::suffices(const Summary& summary) const {
+  const auto known = [this](uint16_t channel) { return channels_.contains(channel); };
+  const auto described = [this](const auto& channel) {
+    return channel.second.schema_id == 0 || schemas_.contains(channel.second.schema_id);
+  };
+  const bool whole = summary.counted && places_.size() == statistics_.chunks &&
+                     channels_.size() == statistics_.channels && summary.metadata.size() == statistics_.metadata;
+  return whole && (!places_.empty() || statistics_.messages == 0) && std::ranges::all_of(channels_, described) &&
+         std::ranges::all_of(statistics_.channel_messages | std::views::keys, known) &&
+         std::ranges::all_of(places_, [&](const auto& place) { return std::ranges::all_of(place.channels, known); });
+}
+
+void Reader::read_metadata(const std::vector<MetadataIndex>& indexes) {
+  for (const MetadataIndex& index : indexes) {
     const auto record = bytes_->read(index.offset, index.length);
     Metadata metadata;
     if (record && record->size() > kRecordHeadBytes && parse(ByteView(*record).subspan(kRecordHeadBytes), metadata)) {
@@ -135,123 +153,9 @@ bool Reader::read_summary() {
       problem("metadata '" + index.name + "' is damaged");
     }
   }
-  return true;
 }
 
-bool Reader::scan(const GoesOn& goes_on) {
-  uint64_t offset = kMagic.size();
-  const uint64_t size = bytes_->size();
-  while (offset < size) {
-    if (goes_on && !goes_on()) return false;
-    if (offset + kMagic.size() == size && has_magic(bytes_->read(offset, kMagic.size()))) return true;
-    const auto record = record_at(offset);
-    if (!record || record->opcode == 0) {
-      const auto next = chunk_behind(offset);
-      unread_bytes_ += next.value_or(size) - offset;
-      const std::string where = "byte " + std::to_string(offset) + " of " + std::to_string(size);
-      if (!next) {
-        problem("ends in the middle of a record at " + where);
-        return true;
-      }
-      problem("no record begins at " + where + ", where one should; goes on with the chunk at byte " +
-              std::to_string(*next));
-      offset = *next;
-      continue;
-    }
-    const uint64_t bytes = kRecordHeadBytes + record->content.size();
-    if (!scan_record(record->opcode, offset, record->content)) {
-      unread_bytes_ += bytes;
-      problem("the record at byte " + std::to_string(offset) + " is damaged and left out");
-    }
-    if (record->opcode == static_cast<uint8_t>(Opcode::data_end)) return true;
-    offset += bytes;
-  }
-  return true;
-}
-
-std::optional<Reader::Record> Reader::record_at(uint64_t offset) const {
-  const auto head = bytes_->read(offset, kRecordHeadBytes);
-  if (!head) return std::nullopt;
-  Decoder decoder(*head);
-  const uint8_t opcode = decoder.u8();
-  auto content = bytes_->read(offset + kRecordHeadBytes, decoder.u64());
-  return content ? std::optional(Record{opcode, std::move(*content)}) : std::nullopt;
-}
-
-// Where a length is damaged, or a block of the disk, the whole chunks behind it are still there.
-std::optional<uint64_t> Reader::chunk_behind(uint64_t offset) const {
-  constexpr uint64_t kBlockBytes = 1U << 20U;
-  const auto is_chunk = [&](uint64_t at) {
-    const auto record = record_at(at);
-    ChunkHead chunk;
-    ByteView stored;
-    return record && parse(record->content, chunk, stored) && chunk.crc != 0 && chunk_records(chunk, stored).ok();
-  };
-  for (uint64_t at = offset + 1; at < bytes_->size(); at += kBlockBytes) {
-    const auto block = bytes_->read(at, std::min(kBlockBytes, bytes_->size() - at));
-    if (!block) return std::nullopt;
-    for (size_t i = 0; i < block->size(); ++i) {
-      if ((*block)[i] == static_cast<uint8_t>(Opcode::chunk) && is_chunk(at + i)) return at + i;
-    }
-  }
-  return std::nullopt;
-}
-
-bool Reader::scan_record(uint8_t opcode, uint64_t offset, ByteView content) {
-  const uint64_t length = kRecordHeadBytes + content.size();
-  switch (static_cast<Opcode>(opcode)) {
-    case Opcode::metadata: {
-      Metadata metadata;
-      if (!parse(content, metadata)) return false;
-      metadata_.push_back(std::move(metadata));
-      ++statistics_.metadata;
-      return true;
-    }
-    case Opcode::attachment:
-      ++statistics_.attachments;
-      return true;
-    case Opcode::message: {
-      Message message;
-      if (!parse(content, message)) return false;
-      statistics_.count(message.channel_id, message.log_time_ns);
-      places_.push_back({message.log_time_ns, message.log_time_ns, offset, length, true, {message.channel_id}});
-      return true;
-    }
-    case Opcode::chunk: {
-      ChunkPlace place{0, 0, offset, length, false, {}};
-      const auto records = load(place);
-      if (!records) return true;  // load() has said why
-      Statistics inside;
-      Decoder decoder(*records);
-      while (decoder.left() > 0) {
-        const uint8_t inner = decoder.u8();
-        const ByteView inner_content = decoder.raw(decoder.u64());
-        Message message;
-        if (!decoder.ok()) break;
-        if (inner != static_cast<uint8_t>(Opcode::message)) {
-          (void)learn(inner, inner_content);
-        } else if (parse(inner_content, message)) {
-          inside.count(message.channel_id, message.log_time_ns);
-          statistics_.count(message.channel_id, message.log_time_ns);
-        }
-      }
-      place.start_ns = inside.start_ns;
-      place.end_ns = inside.end_ns;
-      for (const auto& [id, count] : inside.channel_messages) place.channels.push_back(id);
-      places_.push_back(place);
-      ++statistics_.chunks;
-      return true;
-    }
-    default: {
-      const bool known = learn(opcode, content);
-      statistics_.schemas = static_cast<uint16_t>(schemas_.size());
-      statistics_.channels = static_cast<uint32_t>(channels_.size());
-      return known;
-    }
-  }
-}
-
-std::optional<Bytes> Reader::load(const ChunkPlace& place) {
+std::optional<Bytes> Reader::load(const ChunkPlace& place, uint64_t most_bytes) {
   const auto lost = [&](const std::string& why) {
     problem("the chunk at byte " + std::to_string(place.offset) + " " + why + "; its messages are missing");
     lost_chunks_[place.offset] = place.length;
@@ -266,6 +170,7 @@ std::optional<Bytes> Reader::load(const ChunkPlace& place) {
       !parse(ByteView(*record).subspan(kRecordHeadBytes), head, stored)) {
     return lost("is damaged");
   }
+  if (head.uncompressed_bytes > most_bytes) return lost("needs too much memory beside others of the same time");
   auto records = chunk_records(head, stored);
   if (!records.ok()) return lost("cannot be used, " + records.error().message);
   return std::move(records).value();
@@ -285,7 +190,7 @@ void Reader::for_each(const Selection& selection,
 
 std::optional<Metadata> metadata_in_front(const std::filesystem::path& file, const std::string& name) {
   const auto opened = FileBytes::open(file);
-  if (!opened.ok() || !has_magic(opened.value()->read(0, kMagic.size()))) return std::nullopt;
+  if (!opened.ok() || !opened.value()->has_magic(0)) return std::nullopt;
   const FileBytes& bytes = *opened.value();
   uint64_t offset = kMagic.size();
   while (const auto head = bytes.read(offset, kRecordHeadBytes)) {

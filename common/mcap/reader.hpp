@@ -41,6 +41,7 @@ class FileBytes {
   [[nodiscard]] uint64_t size() const { return size_; }
   /// Nothing when the range is not in the file or cannot be read.
   [[nodiscard]] std::optional<Bytes> read(uint64_t offset, uint64_t length) const;
+  [[nodiscard]] bool has_magic(uint64_t offset) const;
 
  private:
   FileBytes(int descriptor, uint64_t size) : descriptor_(descriptor), size_(size) {}
@@ -54,6 +55,8 @@ struct Selection {
   std::optional<int64_t> from_ns;  // log time, inclusive
   std::optional<int64_t> to_ns;    // log time, exclusive
   bool backwards = false;          // the newest first
+  /// Held in memory of chunks that overlap in time; those beyond are lost. Room for the pictures of many cameras.
+  uint64_t most_held_bytes = uint64_t{1} << 30U;
 };
 
 class Messages;
@@ -68,6 +71,8 @@ class Reader {
   static core::Result<std::unique_ptr<Reader>> open(const std::filesystem::path& file, const GoesOn& goes_on = {});
 
   /// False: the file was not closed properly (cut off, or still being written), or its index is damaged.
+  [[nodiscard]] bool closed() const { return closed_; }
+  /// Read by its index; false, too, of a closed file whose writer left out what a reader needs.
   [[nodiscard]] bool indexed() const { return indexed_; }
   /// A sentence for everything that is missing or damaged, as far as it was met. Messages add to it while they are
   /// read.
@@ -92,10 +97,18 @@ class Reader {
   friend class Messages;
   Reader(std::filesystem::path file, std::shared_ptr<FileBytes> bytes)
       : file_(std::move(file)), bytes_(std::move(bytes)) {}
+  struct Summary {
+    bool counted = false;  // has statistics
+    std::vector<MetadataIndex> metadata;
+  };
   bool read_summary();
-  bool read_summary_record(uint8_t opcode, ByteView content, std::vector<MetadataIndex>& metadata);
+  bool read_summary_record(uint8_t opcode, ByteView content, Summary& summary);
+  [[nodiscard]] bool suffices(const Summary& summary) const;
+  void read_metadata(const std::vector<MetadataIndex>& indexes);
   /// False: `goes_on` says no.
   bool scan(const GoesOn& goes_on);
+  /// The same; to the next whole chunk, or the end.
+  bool skip_damage(uint64_t& offset, const GoesOn& goes_on);
   struct Record {
     uint8_t opcode = 0;
     Bytes content;
@@ -103,14 +116,16 @@ class Reader {
   /// Nothing where no whole one can begin.
   [[nodiscard]] std::optional<Record> record_at(uint64_t offset) const;
   /// The next place where a whole chunk with a right checksum begins.
-  [[nodiscard]] std::optional<uint64_t> chunk_behind(uint64_t offset) const;
+  [[nodiscard]] std::optional<uint64_t> chunk_behind(uint64_t offset, const GoesOn& goes_on) const;
+  [[nodiscard]] bool is_whole_chunk(uint64_t offset) const;
   bool scan_record(uint8_t opcode, uint64_t offset, ByteView content);
   bool learn(uint8_t opcode, ByteView content);
-  std::optional<Bytes> load(const ChunkPlace& place);
+  std::optional<Bytes> load(const ChunkPlace& place, uint64_t most_bytes);
   void problem(const std::string& what);
 
   std::filesystem::path file_;
   std::shared_ptr<FileBytes> bytes_;
+  bool closed_ = false;
   bool indexed_ = false;
   std::vector<std::string> problems_;
   std::map<uint16_t, Schema> schemas_;
@@ -148,9 +163,11 @@ class Messages {
   struct Loaded {
     Bytes records;
     size_t left = 0;
+    uint64_t held_bytes = 0;  // with its entries in the heap
   };
   Messages(Reader& reader, Selection selection);
   void open(uint64_t place);
+  void close(uint64_t place);
   [[nodiscard]] bool wanted(const ChunkPlace& place) const;
   [[nodiscard]] bool wanted(const Message& message) const;
 
@@ -159,6 +176,7 @@ class Messages {
   std::set<uint16_t> channels_;
   std::vector<Entry> heap_;
   std::map<uint64_t, Loaded> loaded_;
+  uint64_t held_bytes_ = 0;
   std::optional<uint64_t> finished_;  // chunk of the last message, to be dropped at the next call
 };
 

@@ -168,14 +168,30 @@ bool parse(ByteView content, Metadata& metadata) {
   return decoder.ok();
 }
 
-bool parse(ByteView content, ChunkHead& head, ByteView& stored_records) {
+namespace {
+
+/// Stands behind it then, in front of the stored records and their length.
+Decoder parse_head(ByteView content, ChunkHead& head) {
   Decoder decoder(content);
   head.start_ns = decoder.time();
   head.end_ns = decoder.time();
   head.uncompressed_bytes = decoder.u64();
   head.crc = decoder.u32();
   head.compression = decoder.text();
+  return decoder;
+}
+
+}  // namespace
+
+bool parse(ByteView content, ChunkHead& head, ByteView& stored_records) {
+  Decoder decoder = parse_head(content, head);
   stored_records = decoder.raw(decoder.u64());
+  return decoder.ok();
+}
+
+bool parse(ByteView content, ChunkHead& head, uint64_t& stored_bytes) {
+  Decoder decoder = parse_head(content, head);
+  stored_bytes = decoder.u64();
   return decoder.ok();
 }
 

@@ -129,6 +129,7 @@ void append(Bytes& out, const Statistics& statistics);
 [[nodiscard]] bool parse(ByteView content, Message& message);  // data points into content
 [[nodiscard]] bool parse(ByteView content, Metadata& metadata);
 [[nodiscard]] bool parse(ByteView content, ChunkHead& head, ByteView& stored_records);
+[[nodiscard]] bool parse(ByteView content, ChunkHead& head, uint64_t& stored_bytes);  // its beginning is enough
 [[nodiscard]] bool parse(ByteView content, ChunkIndex& index);
 [[nodiscard]] bool parse(ByteView content, MetadataIndex& index);
 [[nodiscard]] bool parse(ByteView content, Statistics& statistics);

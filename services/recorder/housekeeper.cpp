@@ -27,6 +27,14 @@ std::string mb_text(uint64_t bytes) {
   return std::to_string(bytes / kBytesPerMb + 1) + " MB";
 }
 
+/// Whether there is more in the cut-off file than an empty recording holds, though no sample that our reader finds.
+bool nothing_came_of(const fs::path& cut_off, const fs::path& recovered) {
+  const auto reader = mcap::Reader::open(recovered);
+  std::error_code failed;
+  return reader.ok() && reader.value()->statistics().messages == 0 &&
+         fs::file_size(cut_off, failed) > fs::file_size(recovered, failed);
+}
+
 }  // namespace
 
 Housekeeper::Housekeeper(fs::path folder, const FolderRules& rules) : folder_(std::move(folder)), rules_(rules) {
@@ -115,7 +123,11 @@ void Housekeeper::recover_next() {
   }
   const fs::path name = mcap::recovered_name(file);
   disk_filled_ = false;
-  const auto lost = mcap::recover(file, name, [this] { return goes_on(); });
+  auto lost = mcap::recover(file, name, [this] { return goes_on(); });
+  if (lost.ok() && nothing_came_of(file, name)) {
+    fs::remove(name, failed);
+    lost = core::Error{"no sample of it can be read"};
+  }
   if (lost.ok()) {
     const std::lock_guard files(files_mutex_);
     take_place(file, name);

@@ -107,13 +107,13 @@ ordered_json json_of(const InfoOptions& options, const Info& info) {
   const auto when = [&](int64_t ns) { return statistics.messages > 0 ? ordered_json(utc_text(ns)) : ordered_json(); };
   const auto by_index = info.reader->indexed() ? ordered_json(statistics.messages) : ordered_json();
   ordered_json json{
-      {"file", options.file.string()},    {"bytes", fs::file_size(options.file)},
-      {"closed", info.reader->indexed()}, {"from", when(statistics.start_ns)},
-      {"to", when(statistics.end_ns)},    {"from_ns", statistics.start_ns},
-      {"to_ns", statistics.end_ns},       {"duration_s", core::seconds(statistics.end_ns - statistics.start_ns)},
-      {"samples", samples_of(info)},      {"samples_by_index", by_index},
-      {"chunks", statistics.chunks},      {"topics", ordered_json::array()},
-      {"lost", losses_of(*info.reader)},  {"metadata", ordered_json::array()}};
+      {"file", options.file.string()},   {"bytes", fs::file_size(options.file)},
+      {"closed", info.reader->closed()}, {"from", when(statistics.start_ns)},
+      {"to", when(statistics.end_ns)},   {"from_ns", statistics.start_ns},
+      {"to_ns", statistics.end_ns},      {"duration_s", core::seconds(statistics.end_ns - statistics.start_ns)},
+      {"samples", samples_of(info)},     {"samples_by_index", by_index},
+      {"chunks", statistics.chunks},     {"topics", ordered_json::array()},
+      {"lost", losses_of(*info.reader)}, {"metadata", ordered_json::array()}};
   std::multimap<std::string, ordered_json> by_name;
   for (const auto& [id, channel] : info.reader->channels()) by_name.emplace(channel.topic, topic_json(info, channel));
   for (const auto& [name, topic] : by_name) json["topics"].push_back(topic);

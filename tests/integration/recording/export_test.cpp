@@ -6,6 +6,7 @@
 #include <set>
 
 #include "integration/recording/recorded_ride.hpp"
+#include "support/other_writers_file.hpp"
 
 namespace railfix {
 namespace {
@@ -308,6 +309,39 @@ TEST_F(Export, AFilmThatIsInterruptedLeavesTheOlderOneAlone) {
     EXPECT_EQ(film.end(signal), 128 + signal) << test::slurp(folder_ / "log");
     EXPECT_EQ(test::slurp(mp4), "old");
     EXPECT_EQ(files(), (std::set<std::string>{"log", "long.mcap", "ride.mcap", "ride.mp4"}));
+  }
+}
+
+TEST_F(Export, AHostileDescriptionOfATypeIsRefusedWithASentence) {
+  std::string nested = "struct T { ";
+  for (int i = 0; i < 200'000; ++i) nested += "sequence<";
+  const auto hostile = folder_ / "hostile.mcap";
+  writer_ = mcap::Writer::create(hostile, {}).value();
+  const auto schema = writer_->add_schema("T", "omgidl", nested).value();
+  const auto channel = writer_->add_channel(schema, "nested", "cdr", {}).value();
+  ASSERT_TRUE(writer_->write({channel, 1, kBegin, kBegin, std::vector<uint8_t>{0, 1, 0, 0}}).ok());
+  ASSERT_TRUE(writer_->close().ok());
+  const auto exported = recording({"export", hostile.string(), "--csv", (folder_ / "tables").string()});
+  EXPECT_EQ(exported.exit_code, 0);
+  EXPECT_THAT(exported.err, HasSubstr("nested: 1 samples were left out; the recording's description of their type T "
+                                      "cannot be read: IDL line 1: more than 32 sequences stand in each other"));
+}
+
+TEST_F(Export, NothingOfOtherWritersFilesIsLeftOut) {
+  for (unsigned bits = 0; bits < test::OtherSummary::kCombinations; bits += 3) {
+    const auto other = folder_ / "other.mcap";
+    const auto bytes = test::other_writers_file(test::OtherSummary(bits));
+    std::ofstream(other, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    const auto info = recording({"info", other.string(), "--json"});
+    ASSERT_EQ(info.exit_code, 0) << bits << info.out << info.err;
+    const auto json = nlohmann::json::parse(info.out);
+    EXPECT_EQ(json["samples"], test::kOtherSamples) << bits;
+    EXPECT_EQ(json["duration_s"], test::kOtherSamples - 1.0) << bits;
+    EXPECT_TRUE(json["closed"]) << bits;
+    const auto tables = folder_ / std::to_string(bits);
+    ASSERT_EQ(recording({"export", other.string(), "--csv", tables.string()}).exit_code, 0);
+    EXPECT_EQ(std::ranges::count(test::slurp(tables / "other.csv"), '\n'), test::kOtherSamples + 1) << bits;
   }
 }
 

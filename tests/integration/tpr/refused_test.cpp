@@ -2,6 +2,7 @@
 #include <sys/resource.h>
 
 #include <csignal>
+#include <future>
 
 #include "integration/tpr/ground_link_fixture.hpp"
 #include "integration/tpr/old_broker.hpp"
@@ -138,6 +139,52 @@ TEST_F(RefusedReports, AreNotSeenByABrokerThatKnowsOnlyMqtt311AndThatIsSaid) {
   EXPECT_GE(old.refused(), 1);
   const auto arrived = ground.reports();
   for (size_t i = 0; i < 50; ++i) EXPECT_EQ(arrived[i].sequence, i + 1);
+}
+
+// Mosquitto's list of rights (acl_file) refuses no subscription, its dynamic security does.
+class RefusedSubscription : public GroundLinkTest {
+ protected:
+  void SetUp() override {
+    GroundLinkTest::SetUp();
+    if (!std::filesystem::exists(kPlugin)) GTEST_SKIP() << kPlugin << " is not installed";
+  }
+  void may_subscribe(bool may) const {
+    std::ofstream(file("security.json")) << R"({"defaultACLAccess": {"publishClientSend": true, )"
+                                         << R"("publishClientReceive": true, "unsubscribe": true, "subscribe": )"
+                                         << (may ? "true" : "false") << "}}";
+  }
+  static constexpr const char* kPlugin = "/usr/lib/x86_64-linux-gnu/mosquitto_dynamic_security.so";
+  test::Broker broker_{file("broker"), std::string("plugin ") + kPlugin + "\nplugin_opt_config_file " +
+                                           file("security.json").string() + "\n"};
+};
+
+TEST_F(RefusedSubscription, IsSaidAndTriedAgainUntilItIsGranted) {
+  for (const bool keep_session : {false, true}) {  // MQTT 5 and 3.1.1
+    may_subscribe(false);
+    ASSERT_TRUE(broker_.start());
+    std::atomic<int> connected = 0;
+    std::atomic<int> disconnected = 0;
+    std::promise<std::string> why;  // at first
+    auto options = link_settings(broker_.address()).mqtt;
+    options.keep_session = keep_session;
+    options.subscribe_to = "railfix/+/position_report";
+    const ground_link::MqttClient client(options, {[&](auto) { ++connected; },
+                                                   [&](const std::string& said) {
+                                                     if (++disconnected == 1) why.set_value(said);
+                                                   },
+                                                   {},
+                                                   {},
+                                                   {}});
+    ASSERT_TRUE(wait_for([&] { return disconnected >= 3; })) << connected;
+    EXPECT_EQ(connected, 0);
+    EXPECT_EQ(why.get_future().get(), "it refuses the subscription to \"railfix/+/position_report\": " +
+                                          std::string(keep_session ? "Unspecified error" : "Not authorized"));
+    broker_.stop();
+    may_subscribe(true);
+    ASSERT_TRUE(broker_.start());
+    EXPECT_TRUE(wait_for([&] { return connected == 1; }));
+    broker_.stop();
+  }
 }
 
 }  // namespace

@@ -205,6 +205,23 @@ TEST(Decode, HostileLayoutsEnd) {
   EXPECT_FALSE(decode(types, "B", cdr).ok());
 }
 
+TEST(Decode, SequencesCountForTheDepth) {
+  // Structures hide the sequences from each other: one element each.
+  std::string text = "struct S0 { octet x; };\n";
+  for (int i = 1; i <= 20; ++i) {
+    text += "struct S" + std::to_string(i) + " { sequence<S" + std::to_string(i - 1) + "> x; };\n";
+  }
+  Types types;
+  ASSERT_TRUE(types.add(text).ok());
+  std::vector<uint8_t> cdr{0, 1, 0, 0};
+  for (int i = 0; i < 20; ++i) cdr.insert(cdr.end(), {1, 0, 0, 0});
+  cdr.push_back(7);
+  EXPECT_TRUE(decode(types, "S15", std::span(cdr)).ok());
+  const auto deep = decode(types, "S20", cdr);
+  ASSERT_FALSE(deep.ok());
+  EXPECT_THAT(deep.error().message, HasSubstr("nest too deeply"));
+}
+
 }  // namespace
 
 }  // namespace railfix::cdr

@@ -86,6 +86,53 @@ TEST(IdlTypes, KnowsOurOwnTypes) {
   EXPECT_TRUE(own_idl_of("railfix::msg::NoSuchType").empty());
 }
 
+std::string refusal(const std::string& text) {
+  Types types;
+  const auto status = types.add(text);
+  return status.ok() ? "no error" : status.error().message;
+}
+
+std::string repeated(size_t count, const std::string& text) {
+  std::string all;
+  for (size_t i = 0; i < count; ++i) all += text;
+  return all;
+}
+
+TEST(IdlTypes, WhatNestsWithoutEndIsRefused) {
+  for (const size_t count : {33U, 200'000U}) {
+    EXPECT_THAT(refusal("struct A { " + repeated(count, "sequence<") + "octet" + repeated(count, ">") + " x; };"),
+                HasSubstr("line 1: more than 32 sequences"));
+    EXPECT_THAT(refusal(repeated(count, "module m { ") + "const long X = 1;" + repeated(count, "};")),
+                HasSubstr("line 1: more than 32 modules"));
+    EXPECT_THAT(refusal("struct A { octet x" + repeated(count, "[1]") + "; };"), HasSubstr("more than 32 dimensions"));
+    std::string aliases = "typedef octet T0;\n";
+    std::string arrays = aliases;
+    for (size_t i = 1; i <= count; ++i) {
+      const std::string before = "T" + std::to_string(i - 1);
+      const std::string name = " T" + std::to_string(i);
+      aliases += "typedef sequence<" + before + ">" + name + ";\n";
+      arrays += "typedef " + before + name + "[1];\n";
+    }
+    EXPECT_THAT(refusal(aliases), HasSubstr("line 34: more than 32 sequences"));
+    EXPECT_THAT(refusal(arrays), HasSubstr("line 34: more than 32 dimensions"));
+  }
+  EXPECT_EQ(refusal("struct A { " + repeated(32, "sequence<") + "octet" + repeated(32, ">") + " x; };"), "no error");
+  EXPECT_EQ(refusal(repeated(50, "module m { const long X = 1; }; ")), "no error") << "beside each other";
+}
+
+TEST(IdlTypes, AnArrayOfAnArrayKeepsBothWhereverItIsNamed) {
+  Types types;
+  ASSERT_TRUE(types.add("typedef double V[3]; typedef V Pos; typedef V Box[2]; struct P { Pos p; Box b[4]; };").ok());
+  const auto& members = types.find("P")->members;
+  EXPECT_THAT(members[0].type.dimensions, ElementsAre(3));
+  EXPECT_THAT(members[1].type.dimensions, ElementsAre(4, 2, 3));
+}
+
+TEST(IdlTypes, AnnotationsThatChangeTheBytesAreRefused) {
+  EXPECT_THAT(refusal("struct A { long x;\n @optional long y; };"), HasSubstr("line 2: @optional is not supported"));
+  EXPECT_THAT(refusal("@bit_bound(8) enum E { A };"), HasSubstr("@bit_bound is not supported"));
+}
+
 }  // namespace
 
 }  // namespace railfix::cdr

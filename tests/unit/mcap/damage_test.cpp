@@ -216,6 +216,64 @@ TEST_F(DamageTest, ARecoveryOnAFullDiskLeavesNothingOfItself) {
   umount2(disk.c_str(), MNT_DETACH);
 }
 
+/// Heads of chunks that each claim what follows, and behind them room for it.
+Bytes heads_of_chunks(size_t count, uint32_t crc) {
+  constexpr uint64_t kClaimed = 5000;
+  Bytes bytes(kMagic.begin(), kMagic.end());
+  Encoder encoder(bytes);
+  encoder.u8(0);
+  for (size_t i = 0; i < count; ++i) {
+    encoder.u8(static_cast<uint8_t>(Opcode::chunk));
+    encoder.u64(kClaimed + 40);
+    encoder.time(1);
+    encoder.time(2);
+    encoder.u64(kClaimed);
+    encoder.u32(crc);
+    encoder.text("");
+    encoder.u64(kClaimed);
+  }
+  bytes.resize(bytes.size() + 2 * kClaimed, 0);
+  return bytes;
+}
+
+TEST_F(DamageTest, WhatOnlyLooksLikeChunksHoldsUpNobody) {
+  constexpr int kAnswered = 10;
+  int asked = 0;
+  const auto a_while = [&] { return ++asked < kAnswered; };
+  const auto stopped = Reader::open(store(heads_of_chunks(100, 1)), a_while);
+  ASSERT_FALSE(stopped.ok()) << "asked " << asked << " times";
+  EXPECT_THAT(stopped.error().message, HasSubstr("was stopped"));
+  EXPECT_EQ(asked, kAnswered);
+  asked = 0;
+  EXPECT_TRUE(Reader::open(store(heads_of_chunks(100, 0)), a_while).ok()) << "their heads alone say what they are not";
+}
+
+TEST_F(DamageTest, ChunksOfOneTimeAreHeldUpToALimitAndTheOthersToldAsLost) {
+  constexpr uint64_t kChunks = 20;
+  const auto file_of = [](int64_t length_ns) {
+    Bytes bytes(kMagic.begin(), kMagic.end());
+    append(bytes, Channel{3, 0, "topic", "json", {}});
+    for (uint64_t i = 0; i < kChunks; ++i) {
+      const auto begin_ns = static_cast<int64_t>(i);
+      const int64_t end_ns = begin_ns + length_ns;
+      Bytes records;
+      append(records, Message{3, 1, begin_ns, begin_ns, bytes_of(std::string(100'000, '\0'))});
+      append(records, Message{3, 2, end_ns, end_ns, bytes_of("{}")});
+      append(bytes, ChunkHead{begin_ns, end_ns, records.size(), 0, "zstd"}, compress(records, Compression::zstd));
+    }
+    return bytes;
+  };
+  Selection selection;
+  selection.most_held_bytes = 550'000;
+  auto overlapping = Reader::open(store(file_of(1000))).value();
+  EXPECT_EQ(read(*overlapping, selection).size(), 10U);
+  EXPECT_EQ(overlapping->lost_chunks().size(), kChunks - 5);
+  EXPECT_THAT(overlapping->problems(), Contains(HasSubstr("too much memory beside others of the same time")));
+  auto in_turn = Reader::open(store(file_of(1))).value();
+  EXPECT_EQ(read(*in_turn, selection).size(), 2 * kChunks);
+  EXPECT_THAT(in_turn->lost_chunks(), IsEmpty());
+}
+
 }  // namespace
 
 }  // namespace railfix::mcap

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "mcap/check.hpp"
 #include "recordings.hpp"
+#include "support/other_writers_file.hpp"
 
 namespace railfix::mcap {
 
@@ -207,6 +209,20 @@ TEST_F(RecordingTest, FullDiskIsAnErrorNotACrash) {
   const auto created = Writer::create(folder_ / "full.mcap", options);
   ASSERT_FALSE(created.ok());
   EXPECT_THAT(created.error().message, HasSubstr("disk full"));
+}
+
+TEST_F(RecordingTest, WhatOtherWritersLeaveOutOfTheSummaryIsFoundInTheFile) {
+  for (unsigned bits = 0; bits < test::OtherSummary::kCombinations; ++bits) {
+    const auto file = store(test::other_writers_file(test::OtherSummary(bits)));
+    auto reader = Reader::open(file).value();
+    EXPECT_EQ(read(*reader).size(), test::kOtherSamples) << bits;
+    EXPECT_EQ(reader->statistics().messages, test::kOtherSamples) << bits;
+    EXPECT_EQ(reader->schemas().size(), 1U) << bits;
+    EXPECT_THAT(reader->problems(), IsEmpty()) << bits;
+    EXPECT_THAT(check(file).value().problems, IsEmpty()) << bits;
+    EXPECT_TRUE(reader->closed());
+  }
+  EXPECT_TRUE(Reader::open(store(test::other_writers_file(test::OtherSummary(63)))).value()->indexed());
 }
 
 }  // namespace

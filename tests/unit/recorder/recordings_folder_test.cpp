@@ -289,6 +289,18 @@ TEST_F(RecordingsFolder, TheHousekeeperKeepsTheQuotaByItself) {
   EXPECT_TRUE(is_protected(folder_ / "kept.mcap"));
 }
 
+TEST_F(RecordingsFolder, WhatNoSampleCanBeReadOfStaysAsItIs) {
+  const fs::path crashed = folder_ / "crashed.mcap.active";
+  const std::string begin("\x89MCAP0\r\n", 8);
+  std::ofstream(crashed, std::ios::binary) << begin << std::string(3000, '\0');
+  EXPECT_THAT(recover({}), ElementsAre(HasSubstr("crashed.mcap.active was left by a crash, cannot be recovered now and "
+                                                 "stays as it is: no sample of it can be read")));
+  EXPECT_EQ(fs::file_size(crashed), 3008U);
+  EXPECT_FALSE(fs::exists(folder_ / "crashed-recovered.mcap"));
+  fs::resize_file(crashed, 8);
+  EXPECT_THAT(recover({}), ElementsAre(HasSubstr("what it held is now in"))) << "there was nothing";
+}
+
 }  // namespace
 
 }  // namespace railfix::recorder

@@ -11,6 +11,7 @@
 #include "messaging/topics.hpp"
 #include "recording/repair.hpp"
 #include "recording/standing_values.hpp"
+#include "support/other_writers_file.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -258,6 +259,23 @@ TEST_F(Copy, OneRecordingIsOneTrains) {
   const auto itself = merge_recordings({a_, a_}, a_);
   ASSERT_FALSE(itself.ok());
   EXPECT_THAT(itself.error().message, HasSubstr("is one of the recordings"));
+}
+
+TEST_F(Copy, NothingOfOtherWritersFilesIsLost) {
+  for (unsigned bits = 0; bits < test::OtherSummary::kCombinations; ++bits) {
+    const auto bytes = test::other_writers_file(test::OtherSummary(bits));
+    std::ofstream(a_, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    const auto made = [&](const std::string& name) { return folder_ / (std::to_string(bits) + name); };
+    ASSERT_TRUE(merge_recordings({a_}, made("merged.mcap")).ok());
+    ASSERT_TRUE(cut_recording(a_, made("cut.mcap"), {0, std::numeric_limits<double>::infinity(), {}, {}}).ok());
+    const auto repaired = repair_recording(a_, made("repaired.mcap"));
+    ASSERT_TRUE(repaired.ok()) << repaired.error().message;
+    EXPECT_EQ(repaired.value().lost.samples, 0U) << bits;
+    for (const char* name : {"merged.mcap", "cut.mcap", "repaired.mcap"}) {
+      EXPECT_EQ(content(made(name)).size(), test::kOtherSamples) << bits << name;
+    }
+  }
 }
 
 }  // namespace

@@ -122,7 +122,7 @@ core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& 
   if (const auto made = tables.make_folder(); !made.ok()) return made.error();
   SampleTypes types(reader);
   const cdr::DecodeOptions options{.name_constants = true};
-  std::map<std::string, uint64_t> unreadable;
+  std::map<std::pair<std::string, std::string>, uint64_t> unreadable;  // by topic and why
   bool stopped = false;
   CsvReport report;
   try {
@@ -133,7 +133,8 @@ core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& 
       const auto sample = type == nullptr ? core::Result<ordered_json>(core::Error{})
                                           : cdr::decode(*types.types(channel), type->name, message.data, options);
       if (!sample.ok()) {
-        ++unreadable[channel.topic];
+        ++unreadable[{channel.topic, type == nullptr ? types.why_unknown(channel)
+                                                     : "they do not fit the type that the recording describes"}];
         return true;
       }
       Table& table = tables.of(channel.topic, *type);
@@ -148,9 +149,9 @@ core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& 
     return core::Error{error.what()};
   }
   report.tables = tables.size();
-  for (const auto& [topic, count] : unreadable) {
-    report.problems.push_back(topic + ": " + std::to_string(count) +
-                              " samples do not fit the type that the recording describes and were left out");
+  for (const auto& [of, count] : unreadable) {
+    const auto& [topic, why] = of;
+    report.problems.push_back(topic + ": " + std::to_string(count) + " samples were left out; " + why);
   }
   return report;
 }

@@ -17,14 +17,28 @@ std::string SampleTypes::type_name(const mcap::Channel& channel) const {
   return schema == reader_.schemas().end() ? "" : schema->second.name;
 }
 
+const SampleTypes::Described& SampleTypes::described(const mcap::Schema& schema) {
+  const auto [known, added] = by_schema_.try_emplace(schema.id);
+  if (added && schema.encoding == "omgidl") known->second.read = known->second.types.add(schema.data);
+  return known->second;
+}
+
 const cdr::Types* SampleTypes::types(const mcap::Channel& channel) {
   const auto schema = reader_.schemas().find(channel.schema_id);
   if (schema == reader_.schemas().end()) return nullptr;
-  const auto [known, added] = by_schema_.try_emplace(channel.schema_id);
-  // A text that cannot be read leaves the types empty: the next line asks our own.
-  if (added && schema->second.encoding == "omgidl") (void)known->second.add(schema->second.data);
-  if (known->second.find(schema->second.name) != nullptr) return &known->second;
-  return cdr::own_types().find(schema->second.name) != nullptr ? &cdr::own_types() : nullptr;
+  const auto& name = schema->second.name;
+  // A text that cannot be read has no such type: then our own are asked.
+  const auto& own = described(schema->second).types;
+  if (own.find(name) != nullptr) return &own;
+  return cdr::own_types().find(name) != nullptr ? &cdr::own_types() : nullptr;
+}
+
+std::string SampleTypes::why_unknown(const mcap::Channel& channel) {
+  const auto schema = reader_.schemas().find(channel.schema_id);
+  if (schema == reader_.schemas().end()) return "the recording does not describe their type";
+  const auto& read = described(schema->second).read;
+  return "the recording's description of their type " + schema->second.name +
+         (read.ok() ? " is not there or not in IDL" : " cannot be read: " + read.error().message);
 }
 
 const cdr::Structure* SampleTypes::structure(const mcap::Channel& channel) {

@@ -22,14 +22,22 @@ class SampleTypes {
   const cdr::Types* types(const mcap::Channel& channel);
   /// Nullptr when the type is not known.
   const cdr::Structure* structure(const mcap::Channel& channel);
+  /// A clause for the user, of a channel whose types() is a nullptr.
+  [[nodiscard]] std::string why_unknown(const mcap::Channel& channel);
   [[nodiscard]] std::string type_name(const mcap::Channel& channel) const;
   [[nodiscard]] bool keyed(const mcap::Channel& channel);
   /// Tells instances of a keyed topic from each other; empty for others, and for bytes that are no such sample.
   std::string key(const mcap::Channel& channel, mcap::ByteView cdr);
 
  private:
+  struct Described {
+    cdr::Types types;
+    core::Status read;  // whether the whole text could be
+  };
+  const Described& described(const mcap::Schema& schema);
+
   const mcap::Reader& reader_;
-  std::map<uint16_t, cdr::Types> by_schema_;
+  std::map<uint16_t, Described> by_schema_;
 };
 
 /// A topic whose last value also reaches those who come later: calibrations and other standing values.
