@@ -15,9 +15,9 @@ namespace railfix::fusion {
 /// Fitted to the way of both over windows of a second, beside their ratio and the wheel's creep, which grows with
 /// acceleration and speed. Where both say another change of speed, as in a slip, and where samples come late, nothing
 /// is measured. Two clocks that nobody keeps together run apart, which at constant speed looks like a ratio: the lag is
-/// less and less known until the speed changes. Stamps that jump on the way, as those of a camera that is started anew, show against the way itself.
-/// Where no lag of half a second fits one of up to two is looked for, and then again one of half a second: the wheel
-/// may have slipped for long.
+/// less and less known until the speed changes. Stamps that jump on the way, as those of a camera that is started anew,
+/// show against the way itself. Where no lag of half a second fits one of up to two is looked for, and then again one
+/// of half a second: the wheel may have slipped for long.
 class CameraLag {
  public:
   struct Lag {

@@ -178,8 +178,7 @@ bool Hypotheses::settle(Doubter& doubter, const Estimator& before, const FixInpu
   const bool gnss_denies = before.watch(Source::gnss).isolated && !main_.watch(Source::gnss).isolated;
   doubter.estimator = before;
   doubter.against += of_shape ? 0 : 1;
-  const double needed =
-      sigmas < kUnlikelySigmas ? kExcusedEvidence : evidence_to_settle(sigmas, doubter.confirmed_by);
+  const double needed = sigmas < kUnlikelySigmas ? kExcusedEvidence : evidence_to_settle(sigmas, doubter.confirmed_by);
   const bool outvoted = landmark_evidence(doubter.against) >= needed;
   return enough && (gnss_denies || outvoted);
 }

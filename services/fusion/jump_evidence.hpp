@@ -10,8 +10,8 @@ namespace railfix::fusion {
 /// A jump of fewer standard deviations is no wonder.
 inline constexpr double kUnlikelySigmas = 2.5;
 
-/// What settles the matter where a sensor that nothing has accused would explain the jump: it is as unlikely to be wrong
-/// as the first of the landmarks, and odds of 100 are left to them.
+/// What settles the matter where a sensor that nothing has accused would explain the jump: it is as unlikely to be
+/// wrong as the first of the landmarks, and odds of 100 are left to them.
 inline constexpr double kExcusedEvidence = 4.6;
 
 /// Against a place, of so many landmarks in a row that say another one. A wrong one is rarely wrong alone: a mount that
