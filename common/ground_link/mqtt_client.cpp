@@ -158,19 +158,23 @@ class MqttClient::Connection {
     });
     mosquitto_publish_v5_callback_set(client_.get(),
                                       [](mosquitto*, void* self, int id, int code, const mosquitto_property*) {
-                                        const auto& connection = *static_cast<Connection*>(self);
-                                        const auto& events = connection.events_;
-                                        if (code < kFirstFailure) {
-                                          if (events.delivered) events.delivered(connection.own_id(id));
-                                        } else if (events.refused) {
-                                          events.refused(connection.own_id(id), refusal_text(code));
-                                        }
+                                        static_cast<const Connection*>(self)->confirmed(id, code);
                                       });
     mosquitto_message_callback_set(client_.get(), [](mosquitto*, void* self, const mosquitto_message* message) {
       const auto& events = static_cast<Connection*>(self)->events_;
       if (events.received)
         events.received({static_cast<const uint8_t*>(message->payload), static_cast<size_t>(message->payloadlen)});
     });
+  }
+
+  void confirmed(int id, int code) const {
+    if (code == MQTT_RC_NO_MATCHING_SUBSCRIBERS && events_.unheard) {
+      events_.unheard(own_id(id));
+    } else if (code < kFirstFailure) {
+      if (events_.delivered) events_.delivered(own_id(id));
+    } else if (events_.refused) {
+      events_.refused(own_id(id), refusal_text(code));
+    }
   }
 
   [[nodiscard]] bool stopped() {

@@ -39,6 +39,8 @@ struct MqttEvents {
   /// The broker has it not, and does not want it. Version 3.1.1 has no words for that: there it is `delivered`.
   std::function<void(int id, const std::string& why)> refused;
   std::function<void(std::span<const uint8_t> payload)> received;
+  /// Nobody has subscribed there, so the broker keeps it for nobody. Version 3.1.1 says `delivered`.
+  std::function<void(int id)> unheard = {};
 };
 
 class MqttClient {
@@ -50,8 +52,9 @@ class MqttClient {
   MqttClient(const MqttClient&) = delete;
   MqttClient& operator=(const MqttClient&) = delete;
 
-  /// QoS 1; gives the id that `delivered` or `refused` will have, unless `disconnected` comes first: then the broker
-  /// may have the message or not, and who published it publishes it again. An error: it was not taken. From any thread.
+  /// QoS 1; gives the id that `delivered`, `refused` or `unheard` will have, unless `disconnected` comes first: then
+  /// the broker may have the message or not, and who published it publishes it again. An error: it was not taken. From
+  /// any thread.
   core::Result<int> publish(const std::string& topic, std::span<const uint8_t> payload);
 
  private:

@@ -31,6 +31,10 @@ GroundLink::GroundLink(const GroundLinkSettings& settings)
                                push(Refused{id, why});
                              },
                          .received = {},
+                         .unheard =
+                             [this](int id) {
+                               push(Refused{id, ""});
+                             },
                      });
   thread_ = std::thread([this] { run(); });
 }
@@ -120,8 +124,9 @@ void GroundLink::take(const Connected& now) {
   remark_ = now.version == ground_link::MqttVersion::v5
                 ? ""
                 : "Ground link: the broker " + broker() +
-                      " knows only MQTT 3.1.1, which confirms what its list of rights refuses: such reports are lost "
-                      "unseen. Look on the ground with railfix tpr listen whether they come.";
+                      " knows only MQTT 3.1.1, which confirms what its list of rights refuses and what nobody there "
+                      "waits for: "
+                      "such reports are lost unseen. Look on the ground with railfix tpr listen whether they come.";
 }
 
 void GroundLink::take(const Disconnected& lost) {
@@ -139,10 +144,19 @@ void GroundLink::take(const Delivered& report) {
 void GroundLink::take(const Refused& report) {
   if (!outbox_.held()) try_again_at_ = Clock::now() + pause();
   outbox_.refused(report.id);
-  const std::string user = settings_.mqtt.user.empty() ? "a client without a user name" : "user " + settings_.mqtt.user;
-  refusal_ = "the broker " + broker() + " refuses what " + user + " writes to " + settings_.topic + " (" + report.why +
-             "); let it write there in the broker's list of rights (acl_file)";
+  refusal_ = report.why.empty() ? nobody_listens() : refused_because(report.why);
   wait_again(report.id);
+}
+
+std::string GroundLink::nobody_listens() const {
+  return "nobody on the ground has subscribed to " + settings_.topic + " at " + broker() +
+         "; start who listens there (as railfix tpr listen)";
+}
+
+std::string GroundLink::refused_because(const std::string& why) const {
+  const std::string user = settings_.mqtt.user.empty() ? "a client without a user name" : "user " + settings_.mqtt.user;
+  return "the broker " + broker() + " refuses what " + user + " writes to " + settings_.topic + " (" + why +
+         "); let it write there in the broker's list of rights (acl_file)";
 }
 
 // With its number: under another one the ground would miss this one.

@@ -59,7 +59,7 @@ class GroundLink {
   };
   struct Refused {
     int id;
-    std::string why;
+    std::string why;  // empty: nobody there waits for it
   };
   struct Unstored {
     ground_link::GroundReport report;  // has its number from when it was first under way
@@ -76,6 +76,8 @@ class GroundLink {
   void take(const Disconnected& lost);
   void take(const Delivered& report);
   void take(const Refused& report);
+  [[nodiscard]] std::string nobody_listens() const;
+  [[nodiscard]] std::string refused_because(const std::string& why) const;
   void wait_again(int id);
   void try_again();
   void remove_delivered();

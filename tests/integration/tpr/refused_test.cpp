@@ -62,6 +62,24 @@ TEST_F(RefusedReports, WaitInTheStoreUntilTheListOfRightsIsMended) {
   }
 }
 
+TEST_F(GroundLinkTest, ReportsWaitUntilSomebodyOnTheGroundListens) {
+  test::Broker broker(file("broker"));
+  ASSERT_TRUE(broker.start());
+  test::Program program(linked_service(broker.address(), {}));
+  ASSERT_TRUE(run_until([&] { return connected() && states_.matched_readers() > 0; }, [] {}));
+  ASSERT_TRUE(run_for(3));
+  ASSERT_TRUE(status_says("nobody on the ground has subscribed to railfix/" + train_ + "/position_report"));
+  ASSERT_TRUE(status_says("3 reports wait"));
+  EXPECT_EQ(status_->state(), msg::STATE_DEGRADED);
+  Ground ground(broker.address(), train_);
+  ASSERT_TRUE(ground.subscribed());
+  const auto each = [&] { write_state(last_.offset_m); };
+  ASSERT_TRUE(run_until([&] { return ground.count() >= 3; }, each)) << reason();
+  ASSERT_TRUE(run_until([&] { return status_->state() == msg::STATE_ACTIVE; }, each)) << reason();
+  EXPECT_EQ(ground.missing(), 0U);
+  EXPECT_EQ(ground.reports()[0].sequence, 1U);
+}
+
 TEST_F(RefusedReports, ArriveInOrderHoweverOftenTheListChanges) {
   constexpr size_t kAtOnce = 100;
   may_write(true);
