@@ -218,20 +218,24 @@ class Railml2Reader {
     }
   }
 
-  /// A track whose coordinates do not fit its length, or end on the way, is laid out without them.
+  /// A track whose coordinates do not fit its length, or end on the way, is laid out without them; so is a piece of it.
   void shape_pieces() {
     for (const auto& [track, pieces] : pieces_) {
       const auto last = pieces.rbegin();
       const double length_m = last->first + net_.tracks[last->second].length_m;
-      std::string why;
-      if (shape_between(points_[track], 0, length_m, why).empty()) {
-        if (!why.empty()) net_.problems.push_back("track " + net_.tracks[track].track.name + " " + why + "; not used");
-        continue;
-      }
+      if (told_shape(track, 0, length_m, track).empty()) continue;
       net_.crs = coordinates_.crs();
       for (const auto& [begin_m, piece] : pieces)
-        net_.tracks[piece].shape = shape_between(points_[track], begin_m, begin_m + net_.tracks[piece].length_m, why);
+        net_.tracks[piece].shape = told_shape(track, begin_m, begin_m + net_.tracks[piece].length_m, piece);
     }
+  }
+
+  /// Of a stretch of the track, which `piece` stands for.
+  std::vector<Eigen::Vector2d> told_shape(size_t track, double from_m, double to_m, size_t piece) {
+    std::string why;
+    std::vector<Eigen::Vector2d> shape = shape_between(points_[track], from_m, to_m, why);
+    if (!why.empty()) net_.problems.push_back("track " + net_.tracks[piece].track.name + " " + why + "; not used");
+    return shape;
   }
 
   [[nodiscard]] std::optional<size_t> piece_after(const Connector& at) const {
