@@ -31,14 +31,12 @@ std::vector<End> ends_of(const std::vector<ImportedTrack>& tracks) {
   return ends;
 }
 
-/// The track lies within it: between its ends an element is off the straight line by no more than its sharpest
-/// curvature bends it.
+/// The track lies within it.
 Eigen::AlignedBox2d box_of(const Alignment& track) {
   Eigen::AlignedBox2d box;
   for (size_t i = 0; i < track.elements().size(); ++i) {
     const Element& element = track.elements()[i];
-    const double sharpest = std::max(std::abs(element.curvature_start_per_m), std::abs(element.curvature_end_per_m));
-    const double off_m = sharpest * element.length_m * element.length_m / 8;
+    const double off_m = bulge_m(element);
     for (const PlanPose& end : {track.starts()[i], advance(track.starts()[i], element, element.length_m)}) {
       const Eigen::Vector2d at(end.easting_m, end.northing_m);
       box.extend(at + Eigen::Vector2d(off_m, off_m));
