@@ -291,6 +291,8 @@ TEST_F(LandXmlTest, WhatEndsBeforeItsAlignmentIsAGuessAndTold) {
   const LandXml single = read(profile_of("<PVI>200 400</PVI>"));
   for (const double at_m : {0.0, 200.0, 300.0, 5000.0}) EXPECT_FALSE(single.tracks[0].alignment.grade_known_at(at_m));
   EXPECT_THAT(single.problems, testing::ElementsAre(HasSubstr("the profile reaches from 200.000 to 200.000")));
+  for (const char* at_an_end : {"<PVI>0 400</PVI>", "<PVI>5000 400</PVI>"})
+    EXPECT_THAT(read(profile_of(at_an_end)).problems, testing::ElementsAre(HasSubstr("the profile reaches from")));
   EXPECT_THAT(read(profile_of("<PVI>0 400</PVI><PVI>5000 410</PVI>")).problems, testing::IsEmpty());
 }
 

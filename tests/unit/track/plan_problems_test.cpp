@@ -151,7 +151,7 @@ TEST_F(PlanProblems, APieceWithoutCoordinatesThatFitSaysWhy) {
 </trackTopology></track><track id="t2"><trackTopology><trackBegin id="b2" pos="0"><connection id="c2" ref="c1"/></trackBegin>
 <trackEnd id="e2" pos="300"/></trackTopology></track></tracks></infrastructure></railml>)";
   EXPECT_THAT(core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems,
-              Contains("track t1 is 100.00 m long, but 110.00 m by its coordinates; not used"));
+              Contains("track t1 up to its first switch is 100.00 m long, but 110.00 m by its coordinates; not used"));
 }
 
 }  // namespace

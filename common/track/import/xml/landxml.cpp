@@ -270,13 +270,18 @@ class LandXmlReader {
       }
     }
     tell_outside(plan, stations, track, "profile");
-    const bool is_level_beyond = level_to_ends(points, plan.stations.back().second);
-    if (is_level_beyond && stations.front() < plan.stations.back().first &&
-        stations.back() > plan.stations.front().first)
-      problem(track + ": the profile reaches from " + told_number(stations.front(), 3) + " to " +
-              told_number(stations.back(), 3) + ", the alignment from " + told_number(plan.stations.front().first, 3) +
-              " to " + told_number(plan.stations.back().first, 3) + "; it is level beyond: a guess");
+    if (level_to_ends(points, plan.stations.back().second)) tell_reach(plan, stations, track);
     return points;
+  }
+
+  /// Of a profile that lies outside altogether more is told already.
+  void tell_reach(const Plan& plan, const std::vector<double>& stations, const std::string& track) {
+    const double begin = plan.stations.front().first;
+    const double end = plan.stations.back().first;
+    if (stations.front() > end + kToldOutsideM || stations.back() < begin - kToldOutsideM) return;
+    problem(track + ": the profile reaches from " + told_number(stations.front(), 3) + " to " +
+            told_number(stations.back(), 3) + ", the alignment from " + told_number(begin, 3) + " to " +
+            told_number(end, 3) + "; it is level beyond: a guess");
   }
 
   /// The stations before and behind a jump are one place.

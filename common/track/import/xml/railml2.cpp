@@ -223,18 +223,23 @@ class Railml2Reader {
     for (const auto& [track, pieces] : pieces_) {
       const auto last = pieces.rbegin();
       const double length_m = last->first + net_.tracks[last->second].length_m;
-      if (told_shape(track, 0, length_m, track).empty()) continue;
+      const std::string called = "track " + net_.tracks[track].track.name;
+      if (told_shape(called, track, 0, length_m).empty()) continue;
       net_.crs = coordinates_.crs();
-      for (const auto& [begin_m, piece] : pieces)
-        net_.tracks[piece].shape = told_shape(track, begin_m, begin_m + net_.tracks[piece].length_m, piece);
+      for (const auto& [begin_m, piece] : pieces) {
+        NetTrack& part = net_.tracks[piece];
+        const bool is_first = piece == track && pieces.size() > 1;
+        part.shape = told_shape(is_first ? called + " up to its first switch" : "track " + part.track.name, track,
+                                begin_m, begin_m + part.length_m);
+      }
     }
   }
 
-  /// Of a stretch of the track, which `piece` stands for.
-  std::vector<Eigen::Vector2d> told_shape(size_t track, double from_m, double to_m, size_t piece) {
+  /// Of a stretch of the track.
+  std::vector<Eigen::Vector2d> told_shape(const std::string& called, size_t track, double from_m, double to_m) {
     std::string why;
     std::vector<Eigen::Vector2d> shape = shape_between(points_[track], from_m, to_m, why);
-    if (!why.empty()) net_.problems.push_back("track " + net_.tracks[piece].track.name + " " + why + "; not used");
+    if (!why.empty()) net_.problems.push_back(called + " " + why + "; not used");
     return shape;
   }
 
