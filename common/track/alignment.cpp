@@ -167,6 +167,11 @@ class ElementSearch {
 
 }  // namespace
 
+double bulge_m(const Element& element) {
+  const double sharpest = std::max(std::abs(element.curvature_start_per_m), std::abs(element.curvature_end_per_m));
+  return 0.125 * sharpest * element.length_m * element.length_m;
+}
+
 PlanPose turned_round(const PlanPose& pose) {
   return {pose.easting_m, pose.northing_m, core::wrap_pi(pose.heading_rad + core::kPi)};
 }

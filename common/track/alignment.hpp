@@ -14,6 +14,9 @@ struct Element {
   double curvature_end_per_m = 0;
 };
 
+/// No place of it is farther from the straight line between its ends.
+double bulge_m(const Element& element);
+
 /// A place in map coordinates with the direction of growing arc length.
 struct PlanPose {
   double easting_m = 0;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <string_view>
 
 #include "core/train_limits.hpp"
@@ -14,9 +15,37 @@ namespace {
 
 constexpr double kLongestEdgeM = 1e6;
 constexpr double kSharpestPerM = 0.1;  // no track has a radius of less than 10 m
+constexpr double kMostTurnRad = 20;    // of one element; to search along many turns takes as long as they are many
 
 bool finite(std::initializer_list<double> values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+}
+
+/// Length of the UTF-8 character (RFC 3629) that begins there; 0 where none does, or one that moves a terminal's
+/// cursor.
+size_t character_at(std::string_view text) {
+  const auto byte = [&](size_t i) { return i < text.size() ? static_cast<uint8_t>(text[i]) : uint8_t{0}; };
+  const auto follows = [&](size_t i) { return (byte(i) & 0xC0U) == 0x80U; };
+  const uint8_t first = byte(0);
+  if (first < 0x80) return first < 0x20 || first == 0x7F ? 0 : 1;
+  if (first == 0xC2 && byte(1) < 0xA0) return 0;
+  if (first >= 0xC2 && first <= 0xDF && follows(1)) return 2;
+  const bool too_long = (first == 0xE0 && byte(1) < 0xA0) || (first == 0xF0 && byte(1) < 0x90);
+  const bool beyond = (first == 0xED && byte(1) > 0x9F) || (first == 0xF4 && byte(1) > 0x8F);
+  if (too_long || beyond || first < 0xE0 || first > 0xF4) return 0;
+  const size_t length = first < 0xF0 ? 3 : 4;
+  return follows(1) && follows(2) && (length == 3 || follows(3)) ? length : 0;
+}
+
+/// Names come from foreign files in any encoding; what is no UTF-8 would make the whole map unreadable, and control
+/// characters would command the terminal that shows them.
+std::string as_text(std::string text) {
+  for (size_t i = 0; i < text.size();) {
+    const size_t length = character_at(std::string_view(text).substr(i));
+    if (length == 0) text[i] = '?';
+    i += std::max<size_t>(1, length);
+  }
+  return text;
 }
 
 template <class Points>
@@ -35,10 +64,11 @@ core::Status check_elements(const map::Edge& edge) {
       return core::Error{where + " has an element with a value that is not a number"};
     }
     if (element.length_m() <= 0) return core::Error{where + " has an element without length"};
-    if (std::abs(element.curvature_start_per_m()) > kSharpestPerM ||
-        std::abs(element.curvature_end_per_m()) > kSharpestPerM) {
-      return core::Error{where + " has a radius of less than 10 m"};
-    }
+    const double sharpest =
+        std::max(std::abs(element.curvature_start_per_m()), std::abs(element.curvature_end_per_m()));
+    if (sharpest > kSharpestPerM) return core::Error{where + " has a radius of less than 10 m"};
+    if (sharpest * element.length_m() > kMostTurnRad)
+      return core::Error{where + " has an element that turns round several times"};
     sum += element.length_m();
   }
   if (sum > kLongestEdgeM) return core::Error{where + " is longer than 1000 km"};
@@ -78,10 +108,10 @@ core::Result<Edge> edge_from(const map::Edge& in) {
     limits.push_back({l.from_m(), l.to_m(), l.speed_mps(), static_cast<Direction>(l.direction())});
   }
   Edge out{.id = in.id(),
-           .name = in.name(),
+           .name = as_text(in.name()),
            .from_node = in.from_node(),
            .to_node = in.to_node(),
-           .line = in.line(),
+           .line = as_text(in.line()),
            .alignment = {},
            .speed_limits = std::move(limits),
            .is_drawn = in.is_drawn()};
@@ -97,7 +127,7 @@ core::Status read_nodes(const map::Map& in, Map& out) {
       return core::Error{"node " + std::to_string(n.id()) + " is of an unknown kind"};
     if (!finite({n.easting_m(), n.northing_m()}))
       return core::Error{"node " + std::to_string(n.id()) + " has a coordinate that is not a number"};
-    out.nodes.push_back({n.id(), static_cast<NodeKind>(n.kind()), n.name(), n.easting_m(), n.northing_m()});
+    out.nodes.push_back({n.id(), static_cast<NodeKind>(n.kind()), as_text(n.name()), n.easting_m(), n.northing_m()});
   }
   return {};
 }
@@ -153,6 +183,11 @@ bool on_edge(const Map& map, uint32_t edge_id, double offset_m) {
   return edge != nullptr && offset_m >= -1e-3 && offset_m <= edge->alignment.length_m() + 1e-3;
 }
 
+/// No rounding puts it beyond an end, where nobody looks for it. REQUIRES: on_edge().
+double within(const Map& map, uint32_t edge_id, double offset_m) {
+  return std::clamp(offset_m, 0.0, map.edge(edge_id)->alignment.length_m());
+}
+
 core::Status read_landmarks(const map::Map& in, Map& out) {
   for (const map::Landmark& l : in.landmarks()) {
     const std::string where = "landmark " + std::to_string(l.id());
@@ -161,8 +196,8 @@ core::Status read_landmarks(const map::Map& in, Map& out) {
     if (!on_edge(out, l.edge(), l.offset_m()) || !finite({l.lateral_m(), l.sigma_m()})) {
       return core::Error{where + " is not on an edge"};
     }
-    out.landmarks.push_back(
-        {l.id(), static_cast<LandmarkKind>(l.kind()), l.edge(), l.offset_m(), l.lateral_m(), l.sigma_m(), l.name()});
+    out.landmarks.push_back({l.id(), static_cast<LandmarkKind>(l.kind()), l.edge(), within(out, l.edge(), l.offset_m()),
+                             l.lateral_m(), l.sigma_m(), as_text(l.name())});
   }
   return {};
 }
@@ -182,7 +217,7 @@ core::Status read_groups(const map::Map& in, Map& out) {
     out.balise_groups.push_back({g.nid_c(),
                                  g.nid_bg(),
                                  g.edge(),
-                                 g.offset_m(),
+                                 within(out, g.edge(), g.offset_m()),
                                  g.nominal_is_forward(),
                                  g.is_virtual(),
                                  g.q_locacc_m(),
@@ -192,11 +227,11 @@ core::Status read_groups(const map::Map& in, Map& out) {
 }
 
 core::Status read_map(const map::Map& in, Map& out) {
-  out.name = in.name();
-  out.source = in.source();
-  out.crs = in.crs();
-  out.problems.assign(in.problems().begin(), in.problems().end());
-  out.learnt_runs.assign(in.learnt_runs().begin(), in.learnt_runs().end());
+  out.name = as_text(in.name());
+  out.source = as_text(in.source());
+  out.crs = as_text(in.crs());
+  std::ranges::transform(in.problems(), std::back_inserter(out.problems), as_text);
+  std::ranges::transform(in.learnt_runs(), std::back_inserter(out.learnt_runs), as_text);
   out.q_locacc_m = in.q_locacc_m();
   if (!std::isfinite(out.q_locacc_m) || out.q_locacc_m < 0)
     return core::Error{"its location accuracy is not a length of 0 m or more"};
@@ -204,33 +239,6 @@ core::Status read_map(const map::Map& in, Map& out) {
     if (core::Status status = read(in, out); !status) return status;
   }
   return {};
-}
-
-/// Length of the UTF-8 character (RFC 3629) that begins there; 0 where none does, or one that moves a terminal's
-/// cursor.
-size_t character_at(std::string_view text) {
-  const auto byte = [&](size_t i) { return i < text.size() ? static_cast<uint8_t>(text[i]) : uint8_t{0}; };
-  const auto follows = [&](size_t i) { return (byte(i) & 0xC0U) == 0x80U; };
-  const uint8_t first = byte(0);
-  if (first < 0x80) return first < 0x20 || first == 0x7F ? 0 : 1;
-  if (first == 0xC2 && byte(1) < 0xA0) return 0;
-  if (first >= 0xC2 && first <= 0xDF && follows(1)) return 2;
-  const bool too_long = (first == 0xE0 && byte(1) < 0xA0) || (first == 0xF0 && byte(1) < 0x90);
-  const bool beyond = (first == 0xED && byte(1) > 0x9F) || (first == 0xF4 && byte(1) > 0x8F);
-  if (too_long || beyond || first < 0xE0 || first > 0xF4) return 0;
-  const size_t length = first < 0xF0 ? 3 : 4;
-  return follows(1) && follows(2) && (length == 3 || follows(3)) ? length : 0;
-}
-
-/// Names come from foreign files in any encoding; what is no UTF-8 would make the whole map unreadable, and control
-/// characters would command the terminal that shows them.
-std::string as_text(std::string text) {
-  for (size_t i = 0; i < text.size();) {
-    const size_t length = character_at(std::string_view(text).substr(i));
-    if (length == 0) text[i] = '?';
-    i += std::max<size_t>(1, length);
-  }
-  return text;
 }
 
 void write_edge(const Edge& edge, map::Edge& out) {

@@ -10,6 +10,7 @@ constexpr double kCellM = 400.0;
 constexpr double kStepM = 200.0;
 constexpr double kStepRad = 0.5;
 constexpr double kFarthestM = 1e9;  // no projection leads there
+constexpr double kRoundingM = 1e-6;
 
 int64_t cell_of(double coordinate_m) {
   return static_cast<int64_t>(std::floor(coordinate_m / kCellM));
@@ -23,6 +24,17 @@ Alignment::Nearest nearest_on_element(const Alignment& track, uint32_t element, 
   Alignment::Nearest nearest = alone.nearest(easting_m, northing_m);
   nearest.offset_m += track.element_offsets()[element];
   return nearest;
+}
+
+/// Told by its ends alone, in far less time than where it is nearest.
+bool may_be_within(double radius_m, const Alignment& track, uint32_t element_index, const Eigen::Vector2d& point) {
+  const Element& element = track.elements()[element_index];
+  const PlanPose& start = track.starts()[element_index];
+  const PlanPose end = advance(start, element, element.length_m);
+  const Eigen::Vector2d from(start.easting_m, start.northing_m);
+  const Eigen::Vector2d chord = Eigen::Vector2d(end.easting_m, end.northing_m) - from;
+  const double part = std::clamp((point - from).dot(chord) / std::max(chord.squaredNorm(), 1e-12), 0.0, 1.0);
+  return (point - from - part * chord).norm() <= radius_m + bulge_m(element) + kRoundingM;
 }
 
 }  // namespace
@@ -42,7 +54,7 @@ void TrackFinder::enter(const Edge& edge, uint32_t element_index) {
   const double sharpest = std::max(std::abs(element.curvature_start_per_m), std::abs(element.curvature_end_per_m));
   const double count = std::max(1.0, std::ceil(element.length_m * std::max(1.0 / kStepM, sharpest / kStepRad)));
   const double step = element.length_m / count;
-  const double bulge = 0.125 * sharpest * step * step;  // an arc beside its chord
+  const double bulge = bulge_m({step, sharpest, sharpest});
   PlanPose from = start;
   for (double i = 1; i <= count; ++i) {
     const PlanPose to = advance(start, element, i * step);
@@ -78,8 +90,9 @@ std::vector<TrackFinder::Piece> TrackFinder::pieces_near(double easting_m, doubl
 std::vector<NearTrack> TrackFinder::near(double easting_m, double northing_m, double radius_m) const {
   std::vector<NearTrack> out;
   for (const Piece& piece : pieces_near(easting_m, northing_m, radius_m)) {
-    const Alignment::Nearest nearest =
-        nearest_on_element(map_->edge(piece.edge)->alignment, piece.element, easting_m, northing_m);
+    const Alignment& track = map_->edge(piece.edge)->alignment;
+    if (!may_be_within(radius_m, track, piece.element, {easting_m, northing_m})) continue;
+    const Alignment::Nearest nearest = nearest_on_element(track, piece.element, easting_m, northing_m);
     if (out.empty() || out.back().edge != piece.edge) {
       out.push_back({piece.edge, nearest.offset_m, nearest.lateral_m});
     } else if (std::abs(nearest.lateral_m) < std::abs(out.back().lateral_m)) {

@@ -58,6 +58,7 @@ class Check {
     for (const Node& node : map_.nodes) check_node(node);
     take(near_misses(map_), cuts_);
     take(facing_ends(map_), cuts_);
+    take(lying_on_others(map_), cuts_);
     check_balises();
     check_parts();
     tell_sharpest();

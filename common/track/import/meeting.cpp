@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -22,6 +23,11 @@ constexpr double kPointingM = 40.0;
 constexpr double kSmallestBranchRad = core::rad_from_deg(1.0);
 constexpr double kLargestBranchRad = core::rad_from_deg(15.0);
 constexpr size_t kMostKinks = 10;
+// Branches lie on the track that they leave, too, but not for so long.
+constexpr double kLyingM = 0.05;
+constexpr double kLyingRad = 0.02;
+constexpr double kLyingEveryM = 50.0;
+constexpr double kLeastLyingM = 100.0;
 
 /// The pose of a train that leaves the edge over one of its ends.
 PlanPose leaving(const Edge& edge, bool at_end) {
@@ -135,6 +141,43 @@ double kink_rad(const Map& map, const Connection& way) {
   return least;
 }
 
+/// Does a train there run along the edge at the nearest place, either way?
+bool lies_along(const Edge& edge, const NearTrack& nearest, const PlanPose& pose) {
+  const double turn = edge.alignment.at(nearest.offset_m).pose.heading_rad - pose.heading_rad;
+  return std::abs(std::sin(turn)) < kLyingRad;
+}
+
+struct Stretch {
+  uint32_t other = 0;
+  double from_m = 0;
+  double to_m = 0;
+};
+
+/// Of the edge, on others of lower numbers; long ones.
+std::vector<Stretch> stretches_on_others(const Map& map, const TrackFinder& tracks, const Edge& edge) {
+  std::map<uint32_t, Stretch> running;  // up to the place before
+  std::vector<Stretch> out;
+  const auto end = [&](const Stretch& stretch) {
+    if (stretch.to_m - stretch.from_m >= kLeastLyingM) out.push_back(stretch);
+  };
+  const double steps = std::ceil(edge.alignment.length_m() / kLyingEveryM);
+  for (double i = 0; i <= steps; ++i) {
+    const double offset_m = i / steps * edge.alignment.length_m();
+    const PlanPose pose = edge.alignment.at(offset_m).pose;
+    std::map<uint32_t, Stretch> here;
+    for (const NearTrack& near : tracks.near(pose.easting_m, pose.northing_m, kLyingM)) {
+      const Edge& other = *map.edge(near.edge);
+      if (other.id >= edge.id || other.is_drawn || !lies_along(other, near, pose)) continue;
+      const auto before = running.extract(other.id);
+      here[other.id] = {other.id, before.empty() ? offset_m : before.mapped().from_m, offset_m};
+    }
+    for (const auto& [other, stretch] : running) end(stretch);
+    running = std::move(here);
+  }
+  for (const auto& [other, stretch] : running) end(stretch);
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::string> near_misses(const Map& map) {
@@ -151,6 +194,19 @@ std::vector<std::string> near_misses(const Map& map) {
     if (std::any_of(told.rbegin(), told.rend(), is_told)) continue;
     problems.push_back(std::move(miss->told));
     told.emplace_back(end, miss->other);
+  }
+  return problems;
+}
+
+std::vector<std::string> lying_on_others(const Map& map) {
+  const TrackFinder tracks(std::shared_ptr<const Map>(std::shared_ptr<void>(), &map));  // the map outlives it
+  std::vector<std::string> problems;
+  for (const Edge& edge : map.edges) {
+    if (edge.is_drawn || edge.alignment.length_m() < kLeastLyingM) continue;
+    for (const Stretch& stretch : stretches_on_others(map, tracks, edge))
+      problems.push_back(called(edge) + " lies on " + called(*map.edge(stretch.other)) + " from " +
+                         told_m(stretch.from_m) + " to " + told_m(stretch.to_m) +
+                         ": one track is there twice; leave one of them out");
   }
   return problems;
 }

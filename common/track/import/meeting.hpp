@@ -19,6 +19,9 @@ constexpr double kNearMissM = 1.5;
 /// the branch of a switch is. A buffer stop beside the next track is neither.
 std::vector<std::string> near_misses(const Map& map);
 
+/// Edges that lie on others for 100 m or more, as no branch does.
+std::vector<std::string> lying_on_others(const Map& map);
+
 /// Loose ends that face each other over a gap in line: the track between them is missing.
 std::vector<std::string> facing_ends(const Map& map);
 

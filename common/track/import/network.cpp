@@ -1,5 +1,6 @@
 #include "track/import/network.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -30,6 +31,36 @@ std::vector<End> ends_of(const std::vector<ImportedTrack>& tracks) {
   return ends;
 }
 
+/// The track lies within it.
+Eigen::AlignedBox2d box_of(const Alignment& track) {
+  Eigen::AlignedBox2d box;
+  for (size_t i = 0; i < track.elements().size(); ++i) {
+    const Element& element = track.elements()[i];
+    const double off_m = bulge_m(element);
+    for (const PlanPose& end : {track.starts()[i], advance(track.starts()[i], element, element.length_m)}) {
+      const Eigen::Vector2d at(end.easting_m, end.northing_m);
+      box.extend(at + Eigen::Vector2d(off_m, off_m));
+      box.extend(at - Eigen::Vector2d(off_m, off_m));
+    }
+  }
+  return box;
+}
+
+/// A track and where to look for it: most ends lie near few of many tracks.
+struct BoxedTrack {
+  const ImportedTrack* track = nullptr;
+  Eigen::AlignedBox2d box;
+  [[nodiscard]] bool is_near(const End& end, double within_m) const {
+    return box.exteriorDistance(Eigen::Vector2d(end.pose.easting_m, end.pose.northing_m)) < within_m;
+  }
+};
+
+std::vector<BoxedTrack> boxed(const std::vector<ImportedTrack>& tracks) {
+  std::vector<BoxedTrack> out;
+  for (const ImportedTrack& track : tracks) out.push_back({&track, box_of(track.alignment)});
+  return out;
+}
+
 /// Where the end touches the track, as an offset of the track.
 std::optional<double> touch(const End& end, const Alignment& track) {
   const Alignment::Nearest nearest = track.nearest(end.pose.easting_m, end.pose.northing_m);
@@ -39,18 +70,27 @@ std::optional<double> touch(const End& end, const Alignment& track) {
   return nearest.offset_m;
 }
 
-std::string told(const End& end, const std::vector<ImportedTrack>& tracks) {
+/// A ring's ends are one place.
+bool meets_itself(const Alignment& track) {
+  const PlanPose begin = track.at(0).pose;
+  const PlanPose end = track.at(track.length_m()).pose;
+  return std::hypot(end.easting_m - begin.easting_m, end.northing_m - begin.northing_m) < kTouchM &&
+         std::abs(core::wrap_pi(end.heading_rad - begin.heading_rad)) < kTouchRad;
+}
+
+std::string told(const End& end, const std::vector<BoxedTrack>& tracks) {
   double nearest_m = kNeighbourM;
   std::string neighbour;
   for (size_t i = 0; i < tracks.size(); ++i) {
-    if (i == end.track) continue;
-    const double distance = std::abs(tracks[i].alignment.nearest(end.pose.easting_m, end.pose.northing_m).lateral_m);
+    if (i == end.track || !tracks[i].is_near(end, nearest_m)) continue;
+    const Alignment& track = tracks[i].track->alignment;
+    const double distance = std::abs(track.nearest(end.pose.easting_m, end.pose.northing_m).lateral_m);
     if (distance >= nearest_m) continue;
     nearest_m = distance;
-    neighbour = tracks[i].name;
+    neighbour = tracks[i].track->name;
   }
-  std::string sentence =
-      std::string("the ") + (end.is_end ? "end" : "start") + " of " + tracks[end.track].name + " is not connected";
+  std::string sentence = std::string("the ") + (end.is_end ? "end" : "start") + " of " + tracks[end.track].track->name +
+                         " is not connected";
   if (!neighbour.empty()) {
     sentence += "; the nearest track, " + neighbour + ", is " + told_m(nearest_m) + " away";
   }
@@ -207,16 +247,17 @@ void add_pieces(const ImportedTrack& track, const std::vector<TrackCut>& cuts, D
 
 Draft cut_tracks(std::vector<ImportedTrack> tracks, std::vector<std::string>& problems) {
   std::vector<std::vector<double>> cuts(tracks.size());
+  const std::vector<BoxedTrack> near = boxed(tracks);
   for (const End& end : ends_of(tracks)) {
-    bool touches = false;
+    bool touches = meets_itself(tracks[end.track].alignment);
     for (size_t other = 0; other < tracks.size(); ++other) {
-      if (other == end.track) continue;
+      if (other == end.track || !near[other].is_near(end, 2.0 * kTouchM)) continue;
       const std::optional<double> offset = touch(end, tracks[other].alignment);
       if (!offset) continue;
       touches = true;
       if (*offset > kTouchM && *offset < tracks[other].alignment.length_m() - kTouchM) cuts[other].push_back(*offset);
     }
-    if (!touches) problems.push_back(told(end, tracks));
+    if (!touches) problems.push_back(told(end, near));
   }
   Draft draft;
   for (size_t i = 0; i < tracks.size(); ++i) {

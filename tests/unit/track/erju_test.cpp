@@ -226,5 +226,32 @@ TEST_F(ErjuCant, WhatIsNotSureOfItIsTold) {
               Contains("track edge \"T1\" has samplePointCant 301 mm at 110.00 m, which no track has; left out"));
 }
 
+// A reference that is not where its track edge is would put every train to the edge's end.
+TEST_F(ErjuTest, BalisesOffTheirTrackEdgeAreLeftOutAndTold) {
+  const auto group = [](int number, const std::vector<int>& at_m) {
+    std::string text = "<baliseGroup id=\"g" + std::to_string(number) + "\" nid_c=\"1\" nid_bg=\"" +
+                       std::to_string(number) + "\"><balises>";
+    for (const int at : at_m)
+      text += "<balise id=\"x" + std::to_string(at) + "\"><spotLocation trackEdge=\"T1\" pos=\"" +
+              std::to_string(1000 * at) + "\"/></balise>";
+    return text + "</balises></baliseGroup>";
+  };
+  const Map map = map_of("<baliseGroups>" + group(1, {-50}) + group(2, {400}) + group(3, {200, 301}) +
+                         group(4, {-1, 2}) + "</baliseGroups>");
+  ASSERT_EQ(map.balise_groups.size(), 1U);
+  EXPECT_EQ(map.balise_groups[0].nid_bg, 3U);
+  EXPECT_EQ(map.balise_groups[0].offset_m, 200);
+  EXPECT_EQ(map.balise_groups[0].balises.size(), 1U);
+  EXPECT_THAT(marks_of(map, {LandmarkKind::balise}), ElementsAre("balise x2 at 2.0 on 1", "balise x200 at 200.0 on 1"));
+  for (const char* balise : {"x-50", "x400", "x301", "x-1"})
+    EXPECT_THAT(map.problems,
+                Contains("balise \"" + std::string(balise) + "\" is not on its track edge; it is left out"));
+  for (const char* number : {"g1", "g2"})
+    EXPECT_THAT(map.problems, Contains("balise group \"" + std::string(number) +
+                                       "\" has no balises on a track edge; it is left out"));
+  EXPECT_THAT(map.problems, Contains("balise group \"g4\" lacks its first balise, which its place counts from; its "
+                                     "other balises are kept as landmarks"));
+}
+
 }  // namespace
 }  // namespace railfix::track

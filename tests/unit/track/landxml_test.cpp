@@ -1,5 +1,6 @@
 #include "track/import/xml/landxml.hpp"
 
+#include <ctime>
 #include <pugixml.hpp>
 #include <sstream>
 
@@ -258,6 +259,114 @@ TEST_F(LandXmlTest, NoDamageToTheFileCrashesIt) {
       EXPECT_TRUE(std::isfinite(track.alignment.at(10).pose.easting_m));
     }
   }
+}
+
+/// A straight of 5 km with this in its alignment.
+std::string straight_with(const std::string& parts) {
+  return "<LandXML version=\"1.2\"><Units><Metric linearUnit=\"meter\"/></Units><Alignments><Alignment name=\"A\" "
+         "length=\"5000\" staStart=\"0\"><CoordGeom><Line><Start>5300000 600000</Start><End>5300000 605000</End></Line>"
+         "</CoordGeom>" +
+         parts + "</Alignment></Alignments></LandXML>";
+}
+std::string profile_of(const std::string& points) {
+  return "<Profile><ProfAlign name=\"p\">" + points + "</ProfAlign></Profile>";
+}
+
+TEST_F(LandXmlTest, WhatEndsBeforeItsAlignmentIsAGuessAndTold) {
+  const auto read = [&](const std::string& parts) {
+    return core::value_or_throw(read_landxml(write("a.xml", straight_with(parts))));
+  };
+  const LandXml half = read(profile_of("<PVI>200 400</PVI><PVI>700 410</PVI>"));
+  const Alignment& track = half.tracks[0].alignment;
+  EXPECT_TRUE(track.grade_known_at(450));
+  EXPECT_NEAR(track.at(450).grade, 0.02, 1e-12);
+  for (const auto& [at_m, elevation_m] : {std::pair(0.0, 400.0), {100.0, 400.0}, {4000.0, 410.0}, {5000.0, 410.0}}) {
+    EXPECT_FALSE(track.grade_known_at(at_m)) << at_m;
+    EXPECT_NEAR(track.at(at_m).elevation_m, elevation_m, 1e-9) << at_m;
+    EXPECT_EQ(track.at(at_m).grade, 0) << at_m;
+  }
+  EXPECT_THAT(half.problems,
+              testing::ElementsAre("A: the profile reaches from 200.000 to 700.000, the alignment from 0.000 to "
+                                   "5000.000; it is level beyond: a guess"));
+  const LandXml single = read(profile_of("<PVI>200 400</PVI>"));
+  for (const double at_m : {0.0, 200.0, 300.0, 5000.0}) EXPECT_FALSE(single.tracks[0].alignment.grade_known_at(at_m));
+  EXPECT_THAT(single.problems, testing::ElementsAre(HasSubstr("the profile reaches from 200.000 to 200.000")));
+  for (const char* at_an_end : {"<PVI>0 400</PVI>", "<PVI>5000 400</PVI>"})
+    EXPECT_THAT(read(profile_of(at_an_end)).problems, testing::ElementsAre(HasSubstr("the profile reaches from")));
+  EXPECT_THAT(read(profile_of("<PVI>0 400</PVI><PVI>5000 410</PVI>")).problems, testing::IsEmpty());
+}
+
+TEST_F(LandXmlTest, CantThatRunsOnBehindItsLastStationIsTold) {
+  const auto problems = [&](const std::string& last_mm) {
+    const std::string cant =
+        "<Cant><CantStation station=\"100\" appliedCant=\"0\" curvature=\"ccw\"/><CantStation station=\"200\" "
+        "appliedCant=\"" +
+        last_mm + "\" curvature=\"ccw\"/></Cant>";
+    return core::value_or_throw(read_landxml(write("a.xml", straight_with(cant)))).problems;
+  };
+  EXPECT_THAT(problems("80"),
+              testing::ElementsAre("A: the last cant station, 200.000, has a cant of 0.080 m; it holds up to the "
+                                   "alignment's end at 5000.000: is a station with 0 missing?"));
+  EXPECT_THAT(problems("0"), testing::IsEmpty());
+}
+
+TEST_F(LandXmlTest, StationsOnBothSidesOfAJumpAreOnePlace) {
+  const auto read = [&](const std::string& behind_m) {
+    return core::value_or_throw(read_landxml(
+        write("a.xml",
+              "<LandXML><Units><Metric linearUnit=\"meter\"/></Units><Alignments><Alignment name=\"J\" "
+              "staStart=\"0\"><CoordGeom><Line staStart=\"0\"><Start>0 0</Start><End>0 1000</End></Line>"
+              "<Line staStart=\"5000\"><Start>0 1000</Start><End>0 2000</End></Line></CoordGeom>" +
+                  profile_of("<PVI>0 400</PVI><PVI>1000 410</PVI><PVI>5000 " + behind_m + "</PVI><PVI>6000 400</PVI>") +
+                  "</Alignment></Alignments></LandXML>")));
+  };
+  const LandXml jump = read("410");
+  EXPECT_NEAR(jump.tracks[0].alignment.at(500).elevation_m, 405, 1e-9);
+  EXPECT_NEAR(jump.tracks[0].alignment.at(1500).elevation_m, 405, 1e-9);
+  EXPECT_THAT(jump.problems, testing::ElementsAre(HasSubstr("behind the end of the one before")));
+  EXPECT_THAT(
+      read("411").problems,
+      testing::Contains("J: the profile's point at 5000.000 is at the place of the one before it, 1.000 m above "
+                        "or below; it is left out"));
+}
+
+TEST_F(LandXmlTest, AHalfCircleIsNotTooMuch) {
+  const LandXml read = core::value_or_throw(read_landxml(
+      write("a.xml",
+            "<LandXML><Units><Metric linearUnit=\"meter\"/></Units><Alignments><Alignment name=\"H\"><CoordGeom>"
+            "<Curve rot=\"cw\" radius=\"300\" length=\"942.478\" crvType=\"arc\"><Start>0 0</Start><End>0 600</End>"
+            "</Curve></CoordGeom></Alignment></Alignments></LandXML>")));
+  EXPECT_NEAR(read.tracks[0].alignment.length_m(), 300 * core::kPi, 1e-2);
+  EXPECT_NEAR(read.tracks[0].alignment.at(150 * core::kPi).pose.northing_m, 300, 1e-2);
+}
+
+// Every element knows its line, and most of a file may be other things.
+TEST_F(LandXmlTest, ManyElementsBehindManyLinesAreReadInTheTimeOfBoth) {
+  std::string text = "<LandXML><Units><Metric linearUnit=\"meter\"/></Units>";
+  text += std::string(4000000, '\n') + "<Alignments><Alignment name=\"L\"><CoordGeom>";
+  for (int i = 0; i < 10000; ++i) {
+    text +=
+        "<Line><Start>0 " + std::to_string(10 * i) + "</Start><End>0 " + std::to_string(10 * i + 10) + "</End></Line>";
+  }
+  text += "\n<Chain/></CoordGeom></Alignment></Alignments></LandXML>";
+  const auto file = write("long.xml", text);
+  const std::clock_t begin = std::clock();
+  EXPECT_THAT(read_landxml(file).error().message, HasSubstr("line 4000002: <Chain> cannot be read"));
+  EXPECT_LT(std::clock() - begin, 5 * CLOCKS_PER_SEC);
+}
+
+TEST_F(LandXmlTest, ARingIsConnectedWithItself) {
+  std::string text =
+      "<LandXML><Units><Metric linearUnit=\"meter\"/></Units><Alignments><Alignment name=\"ring\"><CoordGeom>";
+  const char* const ends[] = {"0 200", "200 0", "0 -200", "-200 0", "0 200"};
+  for (int i = 0; i < 4; ++i) {
+    text += std::string("<Curve rot=\"ccw\" radius=\"200\" length=\"314.159265359\"><Start>") + ends[i] +
+            "</Start><End>" + ends[i + 1] + "</End></Curve>";
+  }
+  text += "</CoordGeom></Alignment></Alignments></LandXML>";
+  const Map map = core::value_or_throw(build_map({write("a.xml", text)}, {})).map;
+  EXPECT_EQ(map.nodes.size(), 1U);
+  EXPECT_THAT(map.problems, testing::Not(testing::Contains(HasSubstr("is not connected"))));
 }
 
 }  // namespace

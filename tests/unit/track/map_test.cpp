@@ -303,5 +303,41 @@ TEST(Utm, FindsTheZone) {
   EXPECT_EQ(utm_crs({.lat_deg = 0, .lon_deg = 180}), "EPSG:32660");
 }
 
+// Whoever draws or searches along it would not come back.
+TEST_F(MapFile, RefusesElementsThatTurnOnAndOn) {
+  Map map = small_map();
+  map.edges[0].alignment = Alignment::chained({}, {{1000, -0.1, 0.1}});
+  EXPECT_THAT(map.save(file()).error().message, HasSubstr("edge 1 has an element that turns round several times"));
+  map.edges[0].alignment = Alignment::chained({}, {{1000, 0.01, 0.01}});  // a spiral ramp of less than two rounds
+  EXPECT_TRUE(map.save(file()).ok());
+}
+
+TEST_F(MapFile, NamesGiveATerminalNoOrdersWhoeverWroteThem) {
+  ASSERT_TRUE(small_map().save(file()).ok());
+  std::string text = content();
+  for (const std::string name : {"main", "line 1", "W1", "tunnel", "small"}) {
+    for (size_t at = text.find(name); at != std::string::npos; at = text.find(name, at)) text[at] = '\x1B';
+  }
+  write(text);
+  const Map map = core::value_or_throw(Map::load(file()));
+  EXPECT_EQ(map.edges[0].name, "?ain");
+  EXPECT_EQ(map.edges[0].line, "?ine 1");
+  EXPECT_EQ(map.nodes[1].name, "?1");
+  EXPECT_EQ(map.landmarks[1].name, "?unnel");
+  EXPECT_EQ(map.name, "?mall");
+}
+
+TEST_F(MapFile, NothingLiesBeyondAnEndByRounding) {
+  Map map = small_map();
+  map.landmarks[0].offset_m = 1000.0009;
+  map.landmarks[2].offset_m = -0.0009;
+  map.balise_groups[0].offset_m = 1000.0009;
+  ASSERT_TRUE(map.save(file()).ok());
+  const Map read = core::value_or_throw(Map::load(file()));
+  EXPECT_EQ(read.landmarks[0].offset_m, 1000);
+  EXPECT_EQ(read.landmarks[2].offset_m, 0);
+  EXPECT_EQ(read.balise_groups[0].offset_m, 1000);
+}
+
 }  // namespace
 }  // namespace railfix::track

@@ -190,5 +190,33 @@ TEST(KinksAtNodes, DivergingWaysCountAndRoundOnesAreSound) {
   EXPECT_THAT(kinks_at_nodes(ring), IsEmpty());
 }
 
+TEST(LyingOnOthers, OneTrackThatIsThereTwiceIsTold) {
+  const Alignment line = Alignment::chained({0, 0, 0}, {{1000, 0, 0}});
+  const PlanPose at_300 = line.at(300).pose;
+  const Alignment branch = Alignment::chained(at_300, {{300, 0, 0}, {200, 1.0 / 300, 1.0 / 300}});
+  EXPECT_THAT(lying_on_others(apart({line, branch})),
+              ElementsAre("edge 2 (t2) lies on edge 1 (t1) from 0.00 m to 300.00 m: one track is there twice; leave "
+                          "one of them out"));
+  const PlanPose end = line.at(1000).pose;
+  const Map twice = apart({line, Alignment::chained(turned_round(end), {{1000, 0, 0}})});
+  EXPECT_THAT(check_topology(twice), Contains(HasSubstr("edge 2 (t2) lies on edge 1 (t1) from 0.00 m to 1000.00 m")));
+}
+
+TEST(LyingOnOthers, BranchesCrossingsAndTheNextTrackAreSound) {
+  const Alignment line = Alignment::chained({0, 0, 0}, {{1000, 0, 0}});
+  const Alignment branch = Alignment::chained(line.at(300).pose, {{300, 1.0 / 2500, 1.0 / 2500}});
+  const Alignment across = Alignment::chained({-100, 400, 1.5}, {{200, 0, 0}});
+  EXPECT_THAT(lying_on_others(apart({line, branch, across, straight(4, 0)})), IsEmpty());
+  // A loop meets its line at both ends.
+  EXPECT_THAT(lying_on_others(apart(
+                  {Alignment::chained({0, 0, 0}, {{800, 0, 0}}),
+                   Alignment::chained({0, 0, 0}, {{200, 0.001, 0.001}, {400, -0.001, -0.001}, {200, 0.001, 0.001}})})),
+              IsEmpty());
+  Map drawn = apart({line, line});
+  drawn.edges[1].is_drawn = true;
+  EXPECT_THAT(lying_on_others(drawn), IsEmpty());
+  EXPECT_THAT(lying_on_others(small_map()), IsEmpty());
+}
+
 }  // namespace
 }  // namespace railfix::track

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <set>
 
 #include "core/units.hpp"
@@ -343,6 +344,21 @@ TEST(Check, TheLongestLostPartComesFirst) {
   lengthen(2, 200);
   EXPECT_THAT(check_topology(map), testing::ElementsAre(HasSubstr("edge 3 (t3), 200.00 m, cannot"),
                                                         HasSubstr("edge 1 (t1), 60.00 m, cannot")));
+}
+
+// Loose ends have their neighbour told, which was sought along every track.
+TEST(Network, ManyTracksAreCutInTheTimeOfMany) {
+  std::vector<ImportedTrack> tracks;
+  for (int i = 0; i < 2000; ++i) {
+    const PlanPose start{10.0 * (i % 100), 1100.0 * (i / 100), 0};
+    tracks.push_back({std::to_string(i), "", Alignment::chained(start, std::vector<Element>(5, {200, 0, 0})), {}});
+  }
+  std::vector<std::string> problems;
+  const std::clock_t begin = std::clock();
+  EXPECT_EQ(cut_tracks(std::move(tracks), problems).edges.size(), 2000U);
+  EXPECT_LT(std::clock() - begin, 2 * CLOCKS_PER_SEC);
+  EXPECT_EQ(problems.size(), 4000U);
+  EXPECT_EQ(problems.front(), "the start of 0 is not connected; the nearest track, 1, is 10.00 m away");
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 // What plans without coordinates may not be blamed for, and what they are told.
+#include "core/random.hpp"
 #include "import_fixture.hpp"
 #include "small_map.hpp"
 #include "track/import/build.hpp"
 #include "track/import/finish.hpp"
+#include "track/import/xml/railml2_coordinates.hpp"
 
 namespace railfix::track {
 namespace {
@@ -101,6 +103,55 @@ TEST_F(PlanProblems, ScheibenbergIsBuiltWithoutItsCoordinates) {
   EXPECT_TRUE(map.save(in_folder("scheibenberg.map")).ok());
   EXPECT_THAT(map.problems,
               Contains(HasSubstr("track edge \"T11 _ W1 ]-[ W11\" turns at once by up to 180.0 degrees")));
+}
+
+/// How far the place at `at_m` is put from its own, at most, where the balises of every group stand 3 m apart and
+/// coordinates are rounded to 10 cm.
+double most_beside_m(const Alignment& track, const std::vector<double>& groups_m, double at_m) {
+  core::Random random(7);
+  double most_m = 0;
+  for (int i = 0; i < 100; ++i) {
+    std::vector<Railml2Coordinates::Point> points;
+    for (const double group_m : groups_m) {
+      for (const double offset_m : {group_m, group_m + 3}) {
+        const PlanPose pose = track.at(offset_m).pose;
+        const Eigen::Vector2d rounding(random.uniform(-0.05, 0.05), random.uniform(-0.05, 0.05));
+        points.push_back({offset_m, Eigen::Vector2d(pose.easting_m, pose.northing_m) + rounding});
+      }
+    }
+    std::string why;
+    const auto shape = shape_between(points, 0, at_m, why);
+    EXPECT_EQ(why, "");
+    if (shape.empty()) return 1e9;
+    const PlanPose there = track.at(at_m).pose;
+    most_m = std::max(most_m, (shape.back() - Eigen::Vector2d(there.easting_m, there.northing_m)).norm());
+  }
+  return most_m;
+}
+
+// Between points near to each other and far from the others, their rounding would count by the hundred.
+TEST(PlanProblem, ASwitchBetweenBaliseGroupsStandsWhereItsTrackLeads) {
+  const Alignment straight = Alignment::chained({0, 0, 1}, {{2100, 0, 0}});
+  for (const double at_m : {100.0, 700.0, 1500.0, 1900.0})
+    EXPECT_LT(most_beside_m(straight, {0, 200, 1200, 1800, 2000}, at_m), 0.15) << at_m;
+  const Alignment curve = Alignment::chained({0, 0, 1}, {{900, 1.0 / 300, 1.0 / 300}});
+  for (const double at_m : {225.0, 325.0})
+    EXPECT_LT(most_beside_m(curve, {0, 50, 100, 150, 200, 250, 300, 350, 400}, at_m), 0.15) << at_m;
+}
+
+TEST_F(PlanProblems, APieceWithoutCoordinatesThatFitSaysWhy) {
+  const auto at = [](int easting_m) {
+    return "<geoCoord epsgCode=\"32633\" coord=\"" + std::to_string(600000 + easting_m) + " 5300000\"/>";
+  };
+  const std::string text = R"(<railml version="2.4"><infrastructure><tracks><track id="t1"><trackTopology>
+<trackBegin id="b1" pos="0">)" +
+                           at(0) + R"(</trackBegin><trackEnd id="e1" pos="1000">)" + at(1000) +
+                           R"(</trackEnd><connections><switch id="w1" pos="100">)" + at(110) +
+                           R"(<connection id="c1" ref="c2" orientation="outgoing" course="left"/></switch></connections>
+</trackTopology></track><track id="t2"><trackTopology><trackBegin id="b2" pos="0"><connection id="c2" ref="c1"/></trackBegin>
+<trackEnd id="e2" pos="300"/></trackTopology></track></tracks></infrastructure></railml>)";
+  EXPECT_THAT(core::value_or_throw(build_map({write("a.railml", text)}, {})).map.problems,
+              Contains("track t1 up to its first switch is 100.00 m long, but 110.00 m by its coordinates; not used"));
 }
 
 }  // namespace

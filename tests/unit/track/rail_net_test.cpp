@@ -3,6 +3,7 @@
 #include <set>
 
 #include "import_fixture.hpp"
+#include "railml_text.hpp"
 #include "track/import/build.hpp"
 #include "track/import/xml/rail_net.hpp"
 
@@ -118,6 +119,74 @@ TEST_F(RailmlCrossing, OfRailml2HasSlipsOnlyWhereItSaysSo) {
   const auto slips = core::value_or_throw(build_map({write("b.railml", text("doubleSwitchCrossing"))}, {})).map;
   EXPECT_EQ(slips.connections.size(), 4U);
   EXPECT_THAT(kinds_of(slips), testing::ElementsAre(NodeKind::railway_switch));
+}
+
+using Railml3Plan = ImportTest;
+
+std::string curve3(const std::string& id, const std::string& attributes, const std::string& place) {
+  return "<horizontalCurve id=\"" + id + "\" " + attributes + "><linearLocation>" + place +
+         "</linearLocation></horizontalCurve>";
+}
+
+TEST_F(Railml3Plan, ATransitionLeadsToTheArcOnTheNextNetElement) {
+  const std::string infrastructure =
+      "<geometryCurves>" +
+      curve3("c1", "curveType=\"arc\" radius=\"1000\"", on("n1", "posBegin=\"700\" posEnd=\"900\"")) +
+      curve3("cl", "curveType=\"clothoid\"", on("n1", "posBegin=\"900\" posEnd=\"1000\"")) +
+      curve3("c2", "curveType=\"arc\" radius=\"400\"", on("n2", "posBegin=\"0\" posEnd=\"200\"")) +
+      curve3("c3", "curveType=\"arc\" radius=\"500\"", on("n2", "posBegin=\"700\" posEnd=\"800\"")) +
+      "</geometryCurves>";
+  const auto curvature = [&](const std::string& text, double at_m) {
+    return core::value_or_throw(build_map({write("a.railml", text)}, {})).map.edges[0].alignment.curvature_at(at_m);
+  };
+  const std::string text = railml3(infrastructure);
+  EXPECT_NEAR(curvature(text, 900.001), -1.0 / 1000, 1e-6);
+  EXPECT_NEAR(curvature(text, 999.999), -1.0 / 400, 1e-6);
+  std::string turned = text;  // n2 ends where n1 does
+  const std::string joint = "positionOnB=\"0\"><elementA ref=\"n1\"/><elementB ref=\"n2\"";
+  turned.replace(turned.find(joint), joint.size(), "positionOnB=\"1\"><elementA ref=\"n1\"/><elementB ref=\"n2\"");
+  EXPECT_NEAR(curvature(turned, 999.999), 1.0 / 500, 1e-6);
+}
+
+TEST_F(Railml3Plan, CurvesOnAnotherAreTold) {
+  const std::string infrastructure =
+      "<geometryCurves>" +
+      curve3("c1", "curveType=\"arc\" radius=\"1000\"", on("n1", "posBegin=\"100\" posEnd=\"300\"")) +
+      curve3("c2", "curveType=\"arc\" radius=\"400\"", on("n1", "posBegin=\"150\" posEnd=\"250\"")) +
+      curve3("c3", "curveType=\"arc\" radius=\"800\"", on("n1", "posBegin=\"300\" posEnd=\"400\"")) +
+      "</geometryCurves>";
+  const Map map = core::value_or_throw(build_map({write("a.railml", railml3(infrastructure))}, {})).map;
+  EXPECT_THAT(map.problems, testing::Contains("<horizontalCurve> \"c2\" begins on another curve of track n1, which "
+                                              "holds up to its own end"));
+  EXPECT_THAT(map.problems, testing::Not(testing::Contains(testing::HasSubstr("\"c3\""))));
+}
+
+TEST_F(Railml3Plan, CoordinatesThatDoNotReachTheEndsAreNotStretched) {
+  const auto map_along = [&](double first, double last) {
+    std::string points;
+    for (int i = 0; i <= 8; ++i) {
+      const double along = first + i * (last - first) / 8;
+      points += "<intrinsicCoordinate intrinsicCoord=\"" + std::to_string(along) +
+                "\"><geometricCoordinate positioningSystemRef=\"g\" x=\"" + std::to_string(600000 + 1000 * along) +
+                "\" y=\"5300000\"/></intrinsicCoordinate>";
+    }
+    const std::string text =
+        "<railML version=\"3.2\"><common><positioning><geometricPositioningSystems><geometricPositioningSystem "
+        "id=\"g\" "
+        "crsDefinition=\"EPSG:32633\"/></geometricPositioningSystems></positioning></common><infrastructure><topology>"
+        "<netElements><netElement id=\"A\" length=\"1000\"><associatedPositioningSystem>" +
+        points + "</associatedPositioningSystem></netElement></netElements></topology></infrastructure></railML>";
+    return core::value_or_throw(build_map({write("a.railml", text)}, {})).map;
+  };
+  const auto told = testing::Contains("track A has coordinates, but not from end to end; not used");
+  for (const auto& [first, last] : {std::pair(0.1, 1.0), {0.0, 0.9}, {0.1, 0.9}}) {
+    const Map map = map_along(first, last);
+    EXPECT_THAT(map.problems, told);
+    EXPECT_TRUE(map.edges[0].is_drawn);
+    EXPECT_EQ(map.crs, "");
+  }
+  EXPECT_THAT(map_along(0, 1).problems, testing::Not(told));
+  EXPECT_EQ(map_along(0, 1).crs, "EPSG:32633");
 }
 
 }  // namespace

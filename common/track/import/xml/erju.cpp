@@ -92,37 +92,49 @@ class ErjuReader {
 
   void read_balises() {
     for (const pugi::xml_node& node : descendants(infra_.root(), "baliseGroup")) {
-      const std::string id = node.attribute("id").value();
+      const std::string called = "balise group \"" + std::string(node.attribute("id").value()) + "\"";
       const auto identity = etcs_identity(infra_.required(node, "nid_c"), infra_.required(node, "nid_bg"));
-      if (!identity) throw infra_.wrong(node, "balise group \"" + id + "\" has " + kNoEtcsIdentity);
-      TrackGroup group;
-      group.nid_c = identity->nid_c;
-      group.nid_bg = identity->nid_bg;
-      group.nominal_is_forward = std::string(node.attribute("linkOrientationDirection").value()) != "dirReverse";
-      group.q_locacc_m = 1;
-      std::optional<size_t> on;
-      for (const pugi::xml_node& balise : node.child("balises").children("balise")) {
-        const pugi::xml_node spot = balise.child("spotLocation");
-        const size_t track = edges_.track_of(infra_, spot, "trackEdge");
-        if (on && *on != track) {
-          net_.problems.push_back("balise group \"" + id + "\" lies on two track edges; only its balises on \"" +
-                                  net_.tracks[*on].track.name + "\" are kept");
-          continue;
-        }
-        on = track;
-        const double at = metres(infra_.required(spot, "pos"));
-        if (at > net_.tracks[track].length_m + kOnEdgeM)
-          net_.problems.push_back("balise \"" + std::string(balise.attribute("id").value()) +
-                                  "\" lies beyond the end of its track edge");
-        group.balises.push_back({LandmarkKind::balise, at, 0, kSurveyedM, balise.attribute("id").value()});
-      }
-      if (!on) {
-        net_.problems.push_back("balise group \"" + id + "\" has no balises; it is left out");
+      if (!identity) throw infra_.wrong(node, called + " has " + kNoEtcsIdentity);
+      bool has_reference = true;
+      const auto [track, balises] = balises_of(node, called, has_reference);
+      if (balises.empty()) {
+        net_.problems.push_back(called + " has no balises on a track edge; it is left out");
         continue;
       }
-      group.offset_m = group.balises.front().offset_m;
-      net_.tracks[*on].track.groups.push_back(std::move(group));
+      ImportedTrack& on = net_.tracks[track].track;
+      if (!has_reference) {
+        net_.problems.push_back(
+            called + " lacks its first balise, which its place counts from; its other balises are kept as landmarks");
+        on.marks.insert(on.marks.end(), balises.begin(), balises.end());
+        continue;
+      }
+      const bool is_forward = std::string(node.attribute("linkOrientationDirection").value()) != "dirReverse";
+      on.groups.push_back({identity->nid_c, identity->nid_bg, balises.front().offset_m, is_forward, 1, balises});
     }
+  }
+
+  /// Those on the track edge of its first one that lies on any, and that.
+  std::pair<size_t, std::vector<TrackMark>> balises_of(const pugi::xml_node& group, const std::string& called,
+                                                       bool& has_reference) {
+    size_t on = 0;
+    std::vector<TrackMark> balises;
+    for (const pugi::xml_node& balise : group.child("balises").children("balise")) {
+      const pugi::xml_node spot = balise.child("spotLocation");
+      const std::string id = balise.attribute("id").value();
+      const size_t track = edges_.track_of(infra_, spot, "trackEdge");
+      const double at_m = metres(infra_.required(spot, "pos"));
+      if (!balises.empty() && on != track) {
+        net_.problems.push_back(called + " lies on two track edges; only its balises on \"" +
+                                net_.tracks[on].track.name + "\" are kept");
+      } else if (at_m < 0 || at_m > net_.tracks[track].length_m + kOnEdgeM) {
+        net_.problems.push_back("balise \"" + id + "\" is not on its track edge; it is left out");
+        has_reference = has_reference && !balises.empty();
+      } else {
+        on = track;
+        balises.push_back({LandmarkKind::balise, at_m, 0, kSurveyedM, id});
+      }
+    }
+    return {on, balises};
   }
 
   static std::string id_of(const pugi::xml_node& node) {

@@ -9,6 +9,7 @@
 
 #include "core/units.hpp"
 #include "track/import/told.hpp"
+#include "track/import/xml/landxml_reach.hpp"
 #include "track/import/xml/xml_source.hpp"
 
 namespace railfix::track {
@@ -18,7 +19,8 @@ constexpr double kToleratedStationM = 0.01;
 constexpr double kToleratedLengthM = 1e-3;
 constexpr double kToleratedStepRad = 1e-3;
 constexpr double kToleratedGapM = 1e-4;
-constexpr double kToldOutsideM = 1.0;
+constexpr double kMostTurnRad = core::kPi + 1e-3;  // half a circle, to the rounding of its length
+constexpr double kSameHeightM = 1e-3;
 constexpr size_t kMostProblems = 200;
 
 /// Reads one document; errors are thrown as BadInput inside and become values at the door.
@@ -117,7 +119,7 @@ class LandXmlReader {
       problem(where + " has no length and is left out");
       return;
     }
-    if (length > 1e6 || !(chord < 1e6) || std::max(std::abs(start), std::abs(end)) * length > core::kPi) {
+    if (length > 1e6 || !(chord < 1e6) || std::max(std::abs(start), std::abs(end)) * length > kMostTurnRad) {
       throw source_.wrong(node, "the element turns by more than half a circle or is longer than 1000 km");
     }
     const double length_in_file = kind == "Line" ? source_.number(node, "length").value_or(chord) : length;
@@ -250,10 +252,14 @@ class LandXmlReader {
             node, "<" + std::string(kind) + "> needs a station and an elevation, not \"" + node.text().get() + "\"");
       const double length = kind == "PVI" ? 0.0 : source_.required(node, "length");
       if (length < 0) throw source_.wrong(node, "a vertical curve cannot have a negative length");
-      stations.push_back(numbers[0]);
-      points.push_back({offset_at(plan, numbers[0]), numbers[1], length});
-      if (points.size() > 1 && points.back().offset_m <= points[points.size() - 2].offset_m) {
+      if (!stations.empty() && numbers[0] <= stations.back())
         throw source_.wrong(node, "the profile's stations must grow");
+      stations.push_back(numbers[0]);
+      const GradePoint point{offset_at(plan, numbers[0]), numbers[1], length};
+      if (!points.empty() && point.offset_m <= points.back().offset_m) {
+        tell_step(points.back(), point, numbers[0], track);
+      } else {
+        points.push_back(point);
       }
     }
     for (size_t i = 1; i < points.size(); ++i) {
@@ -264,7 +270,26 @@ class LandXmlReader {
       }
     }
     tell_outside(plan, stations, track, "profile");
+    if (level_to_ends(points, plan.stations.back().second)) tell_reach(plan, stations, track);
     return points;
+  }
+
+  /// Of a profile that lies outside altogether more is told already.
+  void tell_reach(const Plan& plan, const std::vector<double>& stations, const std::string& track) {
+    const double begin = plan.stations.front().first;
+    const double end = plan.stations.back().first;
+    if (stations.front() > end + kToldOutsideM || stations.back() < begin - kToldOutsideM) return;
+    problem(track + ": the profile reaches from " + told_number(stations.front(), 3) + " to " +
+            told_number(stations.back(), 3) + ", the alignment from " + told_number(begin, 3) + " to " +
+            told_number(end, 3) + "; it is level beyond: a guess");
+  }
+
+  /// The stations before and behind a jump are one place.
+  void tell_step(const GradePoint& before, const GradePoint& behind, double station, const std::string& track) {
+    const double step_m = std::abs(behind.elevation_m - before.elevation_m);
+    if (step_m > kSameHeightM)
+      problem(track + ": the profile's point at " + told_number(station, 3) +
+              " is at the place of the one before it, " + told_m(step_m, 3) + " above or below; it is left out");
   }
 
   /// Applied cant is never negative in the file; the curve's direction says which rail is higher.
@@ -283,6 +308,10 @@ class LandXmlReader {
       }
     }
     tell_outside(plan, stations, track, "cant");
+    if (runs_on(points, plan.elements))
+      problem(track + ": the last cant station, " + told_number(stations.back(), 3) + ", has a cant of " +
+              told_m(std::abs(points.back().cant_m), 3) + "; it holds up to the alignment's end at " +
+              told_number(plan.stations.back().first, 3) + ": is a station with 0 missing?");
     return points;
   }
 

@@ -218,20 +218,29 @@ class Railml2Reader {
     }
   }
 
-  /// A track whose coordinates do not fit its length, or end on the way, is laid out without them.
+  /// A track whose coordinates do not fit its length, or end on the way, is laid out without them; so is a piece of it.
   void shape_pieces() {
     for (const auto& [track, pieces] : pieces_) {
       const auto last = pieces.rbegin();
       const double length_m = last->first + net_.tracks[last->second].length_m;
-      std::string why;
-      if (shape_between(points_[track], 0, length_m, why).empty()) {
-        if (!why.empty()) net_.problems.push_back("track " + net_.tracks[track].track.name + " " + why + "; not used");
-        continue;
-      }
+      const std::string called = "track " + net_.tracks[track].track.name;
+      if (told_shape(called, track, 0, length_m).empty()) continue;
       net_.crs = coordinates_.crs();
-      for (const auto& [begin_m, piece] : pieces)
-        net_.tracks[piece].shape = shape_between(points_[track], begin_m, begin_m + net_.tracks[piece].length_m, why);
+      for (const auto& [begin_m, piece] : pieces) {
+        NetTrack& part = net_.tracks[piece];
+        const bool is_first = piece == track && pieces.size() > 1;
+        part.shape = told_shape(is_first ? called + " up to its first switch" : "track " + part.track.name, track,
+                                begin_m, begin_m + part.length_m);
+      }
     }
+  }
+
+  /// Of a stretch of the track.
+  std::vector<Eigen::Vector2d> told_shape(const std::string& called, size_t track, double from_m, double to_m) {
+    std::string why;
+    std::vector<Eigen::Vector2d> shape = shape_between(points_[track], from_m, to_m, why);
+    if (!why.empty()) net_.problems.push_back(called + " " + why + "; not used");
+    return shape;
   }
 
   [[nodiscard]] std::optional<size_t> piece_after(const Connector& at) const {

@@ -1,30 +1,42 @@
 #include "track/import/xml/railml2_coordinates.hpp"
 #include "track/import/told.hpp"
+#include "track/import/xml/railml_readers.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 namespace railfix::track {
 namespace {
 
 constexpr double kSamePlaceM = 0.05;
-constexpr double kNearEndM = 1.0;
-constexpr double kLengthShare = 0.02;  // points far apart cut curves short
+constexpr double kLengthShare = 0.02;   // points far apart cut curves short
+constexpr double kUnevenSpacing = 3.0;  // of neighbouring gaps; beyond it a cubic swings out
 
-/// Cubic through the four points around an offset, fewer where there are fewer.
+/// Cubic through the two points around an offset and one more on either side, where there is one that suits the gap
+/// between the two: nearer ones (balises of a group) would stretch their rounding over it, farther ones bend it.
 Eigen::Vector2d interpolated(const std::vector<Railml2Coordinates::Point>& points, double offset_m) {
-  const auto next = std::lower_bound(points.begin(), points.end(), offset_m,
-                                     [](const auto& point, double offset) { return point.offset_m < offset; });
-  const auto first = next - std::min<ptrdiff_t>(2, next - points.begin());
-  const auto last = next + std::min<ptrdiff_t>(2, points.end() - next);
+  const auto behind = std::lower_bound(points.begin() + 1, points.end() - 1, offset_m,
+                                       [](const auto& point, double offset) { return point.offset_m < offset; });
+  const auto before = behind - 1;
+  const double gap_m = behind->offset_m - before->offset_m;
+  std::vector<Railml2Coordinates::Point> through{*before, *behind};
+  const auto add_if_suits = [&](auto from, auto to, double end_m) {
+    const auto away_m = [&](const auto& point) { return std::abs(point.offset_m - end_m); };
+    const auto found =
+        std::find_if(from, to, [&](const auto& point) { return kUnevenSpacing * away_m(point) >= gap_m; });
+    if (found != to && away_m(*found) <= kUnevenSpacing * gap_m) through.push_back(*found);
+  };
+  add_if_suits(std::make_reverse_iterator(before), points.rend(), before->offset_m);
+  add_if_suits(behind + 1, points.end(), behind->offset_m);
   Eigen::Vector2d at{0, 0};
-  for (auto i = first; i != last; ++i) {
+  for (const auto& point : through) {
     double weight = 1;
-    for (auto k = first; k != last; ++k) {
-      if (k != i) weight *= (offset_m - k->offset_m) / (i->offset_m - k->offset_m);
+    for (const auto& other : through) {
+      if (&other != &point) weight *= (offset_m - other.offset_m) / (point.offset_m - other.offset_m);
     }
-    at += weight * i->at;
+    at += weight * point.at;
   }
   return at;
 }
@@ -67,7 +79,7 @@ std::vector<Railml2Coordinates::Point> Railml2Coordinates::points_of(const pugi:
 std::vector<Eigen::Vector2d> shape_between(const std::vector<Railml2Coordinates::Point>& points, double from_m,
                                            double to_m, std::string& why) {
   if (points.size() < 2 || points.front().offset_m > from_m + kNearEndM || points.back().offset_m < to_m - kNearEndM) {
-    if (!points.empty()) why = "has coordinates, but not from end to end";
+    if (!points.empty()) why = kNotFromEndToEnd;
     return {};
   }
   std::vector<Eigen::Vector2d> shape{interpolated(points, from_m)};

@@ -5,6 +5,7 @@
 
 #include "core/units.hpp"
 #include "track/import/xml/railml3_balises.hpp"
+#include "track/import/xml/railml3_curves.hpp"
 #include "track/import/xml/railml3_signals.hpp"
 #include "track/import/xml/railml3_slopes.hpp"
 #include "track/import/xml/railml_plane.hpp"
@@ -22,7 +23,8 @@ class Railml3Reader {
     read_elements();
     read_relations();
     read_switches();
-    read_plan();
+    read_curves3(source_, places_, net_);
+    read_slopes3(source_, places_, net_);
     tell_cant();
     read_marks();
     read_speeds();
@@ -58,7 +60,7 @@ class Railml3Reader {
       track.length_m = *length;
       read_shape(element, track);
     }
-    net_.crs = plane_.crs();
+    if (std::ranges::any_of(net_.tracks, &NetTrack::has_shape)) net_.crs = plane_.crs();
     if (net_.tracks.empty()) throw core::BadInput(source_.file_name() + " holds no <netElement> with a length");
     for (const pugi::xml_node& node : descendants(source_.root(), "track")) {
       for (const NetPlace& place : places_.of(node)) {
@@ -84,6 +86,11 @@ class Railml3Reader {
       }
     }
     std::stable_sort(points.begin(), points.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    if (points.empty()) return;
+    if (points.front().first * track.length_m > kNearEndM || (1 - points.back().first) * track.length_m > kNearEndM) {
+      net_.problems.push_back("track " + track.track.name + " " + kNotFromEndToEnd + "; not used");
+      return;
+    }
     for (const auto& [along, at] : points) {
       if (track.shape.empty() || (track.shape.back() - at).norm() > 0.05) track.shape.push_back(at);
     }
@@ -145,50 +152,6 @@ class Railml3Reader {
       if (!has_branch)
         net_.problems.push_back(railml_called(points) + " has no branch over a net relation; it is left out");
     }
-  }
-
-  void read_plan() {
-    for (const pugi::xml_node& curve : descendants(source_.root(), "horizontalCurve")) {
-      const std::string type = curve.attribute("curveType").value();
-      const auto radius = source_.number(curve, "radius");
-      if (!radius || *radius == 0 || (!type.empty() && type != "arc")) continue;
-      if (std::abs(*radius) < 10) throw source_.wrong(curve, "a radius of less than 10 m is no railway's");
-      for (const NetPlace& place : places_.of(curve)) {
-        const double curvature = (place.same_direction ? -1.0 : 1.0) / *radius;
-        if (place.to_m > place.from_m)
-          net_.tracks[place.track].bends.push_back({place.from_m, place.to_m, curvature, curvature});
-      }
-    }
-    read_transitions();
-    read_slopes3(source_, places_, net_);
-    for (NetTrack& track : net_.tracks) {
-      std::sort(track.bends.begin(), track.bends.end(),
-                [](const NetBend& a, const NetBend& b) { return a.from_m < b.from_m; });
-    }
-  }
-
-  /// Clothoids and other transition curves lead from the curvature before them to the one behind; straight where the
-  /// file has nothing there. All are taken as clothoids.
-  void read_transitions() {
-    std::vector<std::pair<size_t, NetBend>> found;
-    for (const pugi::xml_node& curve : descendants(source_.root(), "horizontalCurve")) {
-      const std::string type = curve.attribute("curveType").value();
-      if (type.empty() || type == "arc" || type == "straight") continue;
-      for (const NetPlace& place : places_.of(curve)) {
-        if (place.to_m - place.from_m < kNetTouchM) continue;
-        NetBend bend{place.from_m, place.to_m, 0, 0};
-        for (const NetBend& arc : net_.tracks[place.track].bends) {
-          if (std::abs(arc.to_m - bend.from_m) < kNetTouchM) bend.curvature_start_per_m = arc.curvature_end_per_m;
-          if (std::abs(arc.from_m - bend.to_m) < kNetTouchM) bend.curvature_end_per_m = arc.curvature_start_per_m;
-        }
-        if (bend.curvature_start_per_m == 0 && bend.curvature_end_per_m == 0) {
-          net_.problems.push_back("horizontal curve \"" + std::string(curve.attribute("id").value()) + "\" of type " +
-                                  type + " touches no arc; it is taken as a straight");
-        }
-        found.emplace_back(place.track, bend);
-      }
-    }
-    for (const auto& [track, bend] : found) net_.tracks[track].bends.push_back(bend);
   }
 
   void add(LandmarkKind kind, const NetPlace& place, double offset_m, double lateral_m, const pugi::xml_node& of) {

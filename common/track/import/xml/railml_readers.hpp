@@ -30,6 +30,10 @@ bool is_on_track(double offset_m, double length_m);
 std::string not_on_its_track(const pugi::xml_node& node);
 constexpr double kAtEndM = 0.01;
 
+/// Coordinates that end farther from an end of their track say nothing of the rest.
+constexpr double kNearEndM = 1.0;
+constexpr const char* kNotFromEndToEnd = "has coordinates, but not from end to end";
+
 /// 1 on the "left", -1 on the "right", else 0: the file does not say on which side.
 double left_of(const std::string& side);
 

@@ -38,6 +38,7 @@ XmlSource::XmlSource(const std::filesystem::path& file) : file_name_(file.string
   const pugi::xml_parse_result parsed = document_.load_buffer(text_.data(), text_.size());
   // Places are counted in UTF-8, which pugixml makes of UTF-16.
   if (text_.starts_with("\xff\xfe") || text_.starts_with("\xfe\xff")) std::erase(text_, '\0');
+  for (size_t at = text_.find('\n'); at != std::string::npos; at = text_.find('\n', at + 1)) line_ends_.push_back(at);
   if (!parsed) {
     throw core::BadInput(file_name_ + " line " + line_at(parsed.offset) + ": this is not sound XML (" +
                          parsed.description() + ")");
@@ -46,8 +47,9 @@ XmlSource::XmlSource(const std::filesystem::path& file) : file_name_(file.string
 }
 
 std::string XmlSource::line_at(ptrdiff_t offset) const {
-  const size_t length = std::min(static_cast<size_t>(std::max<ptrdiff_t>(offset, 0)), text_.size());
-  return std::to_string(1 + std::count(text_.begin(), text_.begin() + static_cast<ptrdiff_t>(length), '\n'));
+  const auto before = std::lower_bound(line_ends_.begin(), line_ends_.end(), offset,
+                                       [](size_t end, ptrdiff_t at) { return static_cast<ptrdiff_t>(end) < at; });
+  return std::to_string(1 + (before - line_ends_.begin()));
 }
 
 core::BadInput XmlSource::wrong(const pugi::xml_node& node, const std::string& what) const {

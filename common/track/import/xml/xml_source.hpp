@@ -35,6 +35,7 @@ class XmlSource {
   [[nodiscard]] std::string line_at(ptrdiff_t offset) const;
   std::string file_name_;
   std::string text_;
+  std::vector<size_t> line_ends_;  // of the text
   pugi::xml_document document_;
 };
 
