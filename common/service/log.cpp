@@ -4,6 +4,7 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 
 #include "core/time.hpp"
+#include "core/cut_text.hpp"
 
 namespace railfix::service {
 namespace {
@@ -22,7 +23,7 @@ class TopicSink final : public spdlog::sinks::base_sink<std::mutex> {
   void sink_it_(const spdlog::details::log_msg& message) override {
     record_.stamp_ns(core::wall_ns());
     record_.level(static_cast<uint8_t>(message.level));
-    record_.text(std::string(message.payload.data(), std::min(message.payload.size(), kTextBytes)));
+    record_.text(core::cut_text({message.payload.data(), message.payload.size()}, kTextBytes));
     writer_.write(record_);
   }
   void flush_() override {}

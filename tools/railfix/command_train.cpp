@@ -7,6 +7,7 @@
 #include "command_train.hpp"
 #include "commands.hpp"
 #include "core/joined.hpp"
+#include "core/json_text.hpp"
 #include "core/result.hpp"
 #include "number_between.hpp"
 #include "train/check.hpp"
@@ -99,7 +100,7 @@ int say_status(const TrainOptions& options) {
   if (!page.empty()) json["page"] = page;
   const auto again = "railfix train up " + plan.train() + at_root(options.root);
   if (options.json) {
-    std::cout << json.dump(2) << '\n';
+    std::cout << core::json_text(json, 2) << '\n';
   } else {
     std::cout << "train " << plan.train_id << ", host " << plan.host << ", generation " << plan.generation
               << (plan.down    ? ", down: " + again
