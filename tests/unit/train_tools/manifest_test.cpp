@@ -199,5 +199,19 @@ TEST(Examples, HaveNothingMissingButTheirKeys) {
   EXPECT_THAT(missing, Not(Contains(HasSubstr("source is not given"))));
 }
 
+TEST_F(TrainFolder, WhatIsThereTwiceIsTold) {
+  const auto told = [&](const char* replace, const char* by) {
+    const auto read = manifest(kTrain, replace, by);
+    return read.ok() ? "nothing" : read.error().message;
+  };
+  EXPECT_THAT(told("nid_engine: 460042", "nid_engine: 460042\n    nid_engine: 4711"),
+              HasSubstr("train.yaml: settings.tpr_publisher.nid_engine is given twice, lines 21 and 22; remove one"));
+  EXPECT_THAT(told("    odometry: cab\n", "    odometry: cab\n    odometry: coach\n"),
+              HasSubstr("train.services.odometry is given twice, lines 13 and 14; remove one"));
+  EXPECT_THAT(told("    cab: {", "    coach: { address: 10.42.1.13 }\n    cab: {"),
+              HasSubstr("train.hosts.coach is given twice, lines 8 and 10; remove one"));
+  EXPECT_THAT(told("settings:", "---\nsettings:"), HasSubstr("a second document begins in line 19"));
+}
+
 }  // namespace
 }  // namespace railfix::tool

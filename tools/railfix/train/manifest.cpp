@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <initializer_list>
-#include <set>
 
 #include "core/similar_names.hpp"
 #include "messaging/network.hpp"
@@ -62,12 +61,10 @@ class ManifestReader {
   }
 
   void refuse_unknown(const YAML::Node& section, const std::string& path, const std::vector<std::string>& known) {
-    std::set<std::string> seen;
     for (const auto& entry : section) {
       const std::string key = entry.first.Scalar();
       if (std::find(known.begin(), known.end(), key) == known.end())
         problem(entry.first, path + key, "is not known here; " + core::did_you_mean(key, known));
-      if (!seen.insert(key).second) problem(entry.first, path + key, "is given twice");
     }
   }
 
@@ -115,7 +112,6 @@ class ManifestReader {
       TrainHost host;
       host.name = entry.first.Scalar();
       if (!is_name(host.name)) problem(entry.first, path, "is no name of letters, digits, '-', '_' and '.'");
-      if (manifest_.host(host.name) != nullptr) problem(entry.first, path, "is given twice");
       if (!entry.second.IsMap()) {
         problem(entry.first, path, "needs {address: IPv4 address on the train network}");
         continue;
