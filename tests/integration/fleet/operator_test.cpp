@@ -165,5 +165,21 @@ TEST_F(Operator, AServiceThatRefusesItsConfigurationIsNotWaitedFor) {
   EXPECT_THAT(refused.err, HasSubstr("runs again"));
 }
 
+// As on a full disk, which a test cannot fill for everybody.
+TEST_F(Operator, DownEndsEverythingThoughItCannotBeNoted) {
+  ASSERT_EQ(up().exit_code, 0);
+  const auto before = status();
+  const auto plan = folder_ / "root/var/lib/railfix-train/plan.yaml";
+  fs::permissions(plan, fs::perms::owner_write | fs::perms::group_write | fs::perms::others_write,
+                  fs::perm_options::remove);
+  const auto down = train({"down", "--root", root()});
+  fs::permissions(plan, fs::perms::owner_write, fs::perm_options::add);
+  EXPECT_EQ(down.exit_code, 2);
+  EXPECT_THAT(down.err, HasSubstr("the services are stopped, but cannot write " + plan.string()));
+  EXPECT_THAT(down.err, HasSubstr("brings the train up again until that is mended and railfix train down --root " +
+                                  root() + " is typed once more"));
+  for (const auto& service : before["services"]) EXPECT_FALSE(lives(service["pid"].get<pid_t>())) << service;
+}
+
 }  // namespace
 }  // namespace railfix
