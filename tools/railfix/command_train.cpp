@@ -82,7 +82,7 @@ int say_status(const TrainOptions& options) {
     const auto found = state.find(service.name);
     const RunningService process = found == state.end() || !runs ? RunningService{} : found->second;
     const auto health = health_of(plan, runs ? state : HostState{}, service.name);
-    healthy = healthy && health.healthy;
+    healthy = healthy && health.works();
     page += health.serves;
     json["services"].push_back({{"service", service.name},
                                 {"release", service.release},
@@ -90,7 +90,7 @@ int say_status(const TrainOptions& options) {
                                 {"standby", service.standby},
                                 {"pid", process.pid},
                                 {"restarts", process.restarts},
-                                {"healthy", health.healthy},
+                                {"healthy", health.works()},
                                 {"text", health.text}});
     char line[256];
     std::snprintf(line, sizeof(line), "%-15s %-10s %10d %8lld %8d  ", service.name.c_str(), service.release.c_str(),

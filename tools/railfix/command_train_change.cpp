@@ -15,6 +15,10 @@ HostPlan running_plan_here(const TrainOptions& options) {
   if (plan.down)
     throw core::BadInput("the train is down; railfix train up " + plan.train() + at_root(options.root) +
                          " starts it as the manifest says");
+  // Nobody would start what the plan says, and the new generation would be blamed.
+  if (!supervisor_of(HostFolder(options.root)))
+    throw core::BadInput("no supervisor runs here; railfix train up " + plan.train() + at_root(options.root) +
+                         " starts it");
   return plan;
 }
 
