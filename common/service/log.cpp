@@ -2,9 +2,10 @@
 
 #include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
+#include <unistd.h>
 
-#include "core/time.hpp"
 #include "core/cut_text.hpp"
+#include "core/time.hpp"
 
 namespace railfix::service {
 namespace {
@@ -37,7 +38,9 @@ class TopicSink final : public spdlog::sinks::base_sink<std::mutex> {
 std::shared_ptr<spdlog::logger> make_logger(messaging::Participant& participant, const std::string& service,
                                             const CommonConfig& common) {
   auto terminal = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
-  terminal->set_pattern("%H:%M:%S.%e %n %^%l%$ %v");
+  // A file is read days later.
+  terminal->set_pattern(isatty(STDERR_FILENO) == 1 ? "%H:%M:%S.%e %n %^%l%$ %v"
+                                                   : "%Y-%m-%d %H:%M:%S.%e%z %n %^%l%$ %v");
   auto topic = std::make_shared<TopicSink>(participant, service, common.host);
   topic->set_level(spdlog::level::info);
   auto logger = std::make_shared<spdlog::logger>(service, spdlog::sinks_init_list{terminal, topic});

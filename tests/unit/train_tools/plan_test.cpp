@@ -7,6 +7,8 @@
 
 #include <fstream>
 
+#include "train/log_file.hpp"
+
 namespace railfix::tool {
 namespace {
 
@@ -79,6 +81,28 @@ TEST_F(HostFiles, ThatAreDamagedAreTold) {
               HasSubstr("a service without a command"));
   write("state.yaml", "fusion: {pid: many}\n");
   EXPECT_THAT(told([&] { return folder_.state(); }), HasSubstr("state.yaml is damaged (yaml-cpp: error at line 1"));
+}
+
+// Services may hold their log for years.
+TEST_F(HostFiles, ALongLogIsKeptOnceAndBeginsAnew) {
+  const auto log = folder_.log("fusion");
+  const auto write_line = [&](const std::string& line) {
+    const int file = open_log(log);
+    ASSERT_GE(file, 0);
+    ASSERT_EQ(::write(file, line.data(), line.size()), static_cast<ssize_t>(line.size()));
+    close(file);
+  };
+  const auto bytes_of = [](const fs::path& file) { return fs::exists(file) ? fs::file_size(file) : 0; };
+  write_line("first");
+  write_line("second");
+  EXPECT_EQ(bytes_of(log), 11U);
+  fs::resize_file(log, 20'000'001);
+  write_line("third");
+  EXPECT_EQ(bytes_of(log), 5U);
+  EXPECT_EQ(bytes_of(log.string() + ".1"), 20'000'001U);
+  fs::resize_file(log, 20'000'002);
+  write_line("fourth");
+  EXPECT_EQ(bytes_of(log.string() + ".1"), 20'000'002U);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 
 #include "core/time.hpp"
 #include "train/command_lock.hpp"
+#include "train/log_file.hpp"
 #include "train/made_of.hpp"
 #include "train/render.hpp"
 #include "train/running.hpp"
@@ -32,8 +33,7 @@ core::Status start_supervisor(const fs::path& root) {
   const HostFolder folder(root);
   const auto program = fs::read_symlink("/proc/self/exe").string();
   const auto log_file = folder.log("supervisor");
-  fs::create_directories(log_file.parent_path());
-  const int log = open(log_file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  const int log = open_log(log_file);
   const std::string at = fs::absolute(root).string();
   const pid_t pid = fork();
   if (pid == 0) {
