@@ -178,7 +178,7 @@ int diff(const TrainOptions& options) {
   const auto now = plan_here(options);
   if (now.train_id != manifest.train_id)
     throw core::BadInput("train " + now.train_id + " was here before, and is down; railfix train up " +
-                         manifest.folder.string() + at_root(options.root) + " starts " + manifest.train_id);
+                         manifest.typed() + at_root(options.root) + " starts " + manifest.train_id);
   size_t changes = 0;
   for (const auto& service : services_on(manifest, host.name)) {
     const auto* runs = now.service(service.name);
@@ -203,7 +203,7 @@ int diff(const TrainOptions& options) {
     std::cout << service.name << ": leaves this host\n";
   }
   std::cout << (changes == 0 ? "nothing to be done"
-                             : "railfix train upgrade " + manifest.folder.string() + at_root(options.root) +
+                             : "railfix train upgrade " + manifest.typed() + at_root(options.root) +
                                    " does it, service by service")
             << '\n';
   return 0;

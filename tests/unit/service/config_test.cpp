@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "service/service.hpp"
 #include "support/every_setting.hpp"
 
 namespace railfix::service {
@@ -151,6 +152,16 @@ TEST_F(ConfigTest, CommandLineTakesAnyTextAsItStands) {
   for (const char* text : {"/data/pics #2", "a: b", "- a", "&a", "*", "%", "a, b", "@"}) EXPECT_EQ(name(text), text);
   EXPECT_EQ(name("\"a #2\""), "a #2");
   EXPECT_EQ(name("'[a]'"), "[a]");
+}
+
+TEST_F(ConfigTest, NamesOfTrainAndHostMustFitIntoThoseOfFiles) {
+  CommonConfig common;
+  EXPECT_TRUE(common.check().ok());
+  common.train_id = "a/b";
+  EXPECT_THAT(common.check().error().message, HasSubstr("common.train_id 'a/b' is no name of at most 64 letters"));
+  common.train_id = "re460-042";
+  common.host = "";
+  EXPECT_THAT(common.check().error().message, HasSubstr("common.host '' is no name"));
 }
 
 }  // namespace

@@ -213,5 +213,21 @@ TEST_F(TrainFolder, WhatIsThereTwiceIsTold) {
   EXPECT_THAT(told("settings:", "---\nsettings:"), HasSubstr("a second document begins in line 19"));
 }
 
+TEST_F(TrainFolder, AFolderForDraftsThatIsNoneIsTold) {
+  write_map();
+  const char* before = getenv("TMPDIR");
+  const std::string usual = before == nullptr ? "" : before;
+  setenv("TMPDIR", "/nonexistent", 1);
+  const auto told = findings();
+  if (before == nullptr) {
+    unsetenv("TMPDIR");
+  } else {
+    setenv("TMPDIR", usual.c_str(), 1);
+  }
+  EXPECT_THAT(told,
+              ElementsAre("settings cannot be checked: TMPDIR (/nonexistent) is no folder; set TMPDIR to one where "
+                          "you may write"));
+}
+
 }  // namespace
 }  // namespace railfix::tool

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <initializer_list>
 
+#include "core/shell_word.hpp"
 #include "core/similar_names.hpp"
 #include "messaging/network.hpp"
 #include "service/service.hpp"
@@ -13,13 +14,7 @@
 namespace railfix::tool {
 namespace {
 
-// A name that can stand in a DDS partition, a file name and a systemd unit.
-bool is_name(const std::string& text) {
-  return !text.empty() && text.size() <= 64 &&
-         std::all_of(text.begin(), text.end(),
-                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; }) &&
-         text.front() != '.' && text.front() != '-';
-}
+using service::is_name;
 
 // Of "fusion.use_wheel"; 0 = it is not there.
 int line_of(const YAML::Node& section, const std::string& key) {
@@ -237,6 +232,10 @@ std::string with_own_lines(const Manifest& manifest, std::string said, const std
     at += place.size();
   }
   return said;
+}
+
+std::string Manifest::typed() const {
+  return core::shell_word(folder.string());
 }
 
 std::string Manifest::release_of(const TrainService& service) const {

@@ -149,7 +149,7 @@ std::optional<std::string> runs_another_train(const fs::path& root, const Manife
   if (!plan || plan->down || plan->train_id == manifest.train_id) return std::nullopt;
   return "this computer runs train " + plan->train_id + "; " + manifest.folder.string() + " is of train " +
          manifest.train_id + ": railfix train down" + at_root(root) + " first, then railfix train up " +
-         manifest.folder.string() + at_root(root);
+         manifest.typed() + at_root(root);
 }
 
 bool any_runs(const HostFolder& folder) {
