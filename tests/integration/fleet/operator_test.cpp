@@ -181,7 +181,8 @@ TEST_F(Operator, WithoutSupervisorNothingIsUpgradedAndNoGenerationIsBlamed) {
   }
   EXPECT_FALSE(fs::exists(folder_ / "root/var/lib/railfix-train/generations/2"));
 
-  for (const auto& service : status()["services"]) {
+  const auto orphans = status();
+  for (const auto& service : orphans["services"]) {
     ASSERT_GT(service["pid"].get<pid_t>(), 1);
     kill(service["pid"].get<pid_t>(), SIGKILL);
   }

@@ -154,8 +154,7 @@ std::vector<std::string> Supervisor::lost() const {
 // On a busy computer one is silent for a moment now and then.
 bool Supervisor::is_lost(const std::string& service) const {
   const auto* seen = picture_.services.find(service);
-  if (seen == nullptr || !picture_.gone(service)) return false;
-  return seen->alive || core::wall_ns() - seen->received_ns > kLostNs;
+  return seen != nullptr && picture_.gone(service) && core::wall_ns() - seen->since_ns > kLostNs;
 }
 
 }  // namespace railfix::tool
