@@ -1,5 +1,5 @@
-// JSON that comes from a file or the network: errors say where, and what nests without end is refused, because to copy
-// or print it would exhaust the stack.
+// JSON as text. Of what comes from a file or the network errors say where, and what nests without end is refused,
+// because to copy or print it would exhaust the stack.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -42,6 +42,12 @@ Result<Json> parse_json_strictly(std::string_view text) {
   if (!json.ok()) return json;
   if (const auto key = repeated_key(text)) return Error{"the key \"" + *key + "\" is there twice in one object."};
   return json;
+}
+
+/// For who reads on: names and sentences of others may be broken UTF-8, at which dump() throws. No indent: one line.
+template <class Json>
+std::string json_text(const Json& json, int indent = -1) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace railfix::core

@@ -10,6 +10,7 @@
 #include <ctime>
 #include <memory>
 
+#include "core/shell_word.hpp"
 #include "core/time.hpp"
 
 namespace railfix::messaging {
@@ -51,7 +52,7 @@ std::string keys_command(const std::filesystem::path& folder) {
   const char* told = std::getenv(kTrainFolder);
   const bool is_told = told != nullptr && *told != '\0';
   const bool is_in_it = !train.empty() && std::filesystem::exists(train / "train.yaml", none);
-  return "railfix train keys " + (is_in_it ? train.string() : is_told ? told : "TRAIN");
+  return "railfix train keys " + (is_in_it || is_told ? core::shell_word(is_in_it ? train.string() : told) : "TRAIN");
 }
 
 core::Result<std::vector<std::pair<std::string, std::string>>> security_properties(const std::filesystem::path& folder,

@@ -199,24 +199,10 @@ core::Result<YAML::Node> load(const std::filesystem::path& file) {
   return node;
 }
 
-// Without places in a text, so that what is wrong with it is not told with a line of the file.
-YAML::Node unmarked(const YAML::Node& parsed) {
-  if (parsed.IsScalar()) return YAML::Node(parsed.Scalar());
-  YAML::Node plain(parsed.Type());
-  for (const auto& entry : parsed) {
-    if (parsed.IsMap()) {
-      plain[entry.first.Scalar()] = unmarked(entry.second);
-    } else {
-      plain.push_back(unmarked(entry));
-    }
-  }
-  return plain;
-}
-
 core::Status apply_override(YAML::Node section, const std::string& section_name, const Override& change) {
   YAML::Node value;
   try {
-    value = unmarked(YAML::Load(change.value));
+    value = value_of_set(change.value);
   } catch (const YAML::Exception&) {
     return core::Error{"command line: " + change.key + "=" + change.value + " is not a YAML value"};
   }

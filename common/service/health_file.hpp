@@ -58,6 +58,8 @@ struct HealthAnswer {
   bool stuck = false;       // one that answers every input has had input for two seconds and answered none of it
   std::string text;         // one sentence
   std::string serves = {};  // address of its page; empty = it has none, or does not say it
+  /// What an operator calls well.
+  [[nodiscard]] bool works() const { return healthy && !stuck; }
 };
 /// Healthy: its run loop turned within the last two seconds and it has not failed. Degraded is healthy: a restart would
 /// not help; so is stuck: a camera may lack its calibration still.

@@ -2,7 +2,9 @@
 
 #include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
+#include <unistd.h>
 
+#include "core/cut_text.hpp"
 #include "core/time.hpp"
 
 namespace railfix::service {
@@ -22,7 +24,7 @@ class TopicSink final : public spdlog::sinks::base_sink<std::mutex> {
   void sink_it_(const spdlog::details::log_msg& message) override {
     record_.stamp_ns(core::wall_ns());
     record_.level(static_cast<uint8_t>(message.level));
-    record_.text(std::string(message.payload.data(), std::min(message.payload.size(), kTextBytes)));
+    record_.text(core::cut_text({message.payload.data(), message.payload.size()}, kTextBytes));
     writer_.write(record_);
   }
   void flush_() override {}
@@ -36,7 +38,9 @@ class TopicSink final : public spdlog::sinks::base_sink<std::mutex> {
 std::shared_ptr<spdlog::logger> make_logger(messaging::Participant& participant, const std::string& service,
                                             const CommonConfig& common) {
   auto terminal = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();
-  terminal->set_pattern("%H:%M:%S.%e %n %^%l%$ %v");
+  // A file is read days later.
+  terminal->set_pattern(isatty(STDERR_FILENO) == 1 ? "%H:%M:%S.%e %n %^%l%$ %v"
+                                                   : "%Y-%m-%d %H:%M:%S.%e%z %n %^%l%$ %v");
   auto topic = std::make_shared<TopicSink>(participant, service, common.host);
   topic->set_level(spdlog::level::info);
   auto logger = std::make_shared<spdlog::logger>(service, spdlog::sinks_init_list{terminal, topic});

@@ -2,6 +2,7 @@
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
@@ -83,7 +84,7 @@ class SignalWatch {
 int say_health(const CommonConfig& common, const std::string& service) {
   const auto answer = ask_health(health_path(common, service));
   std::cout << service << ": " << answer.text << '\n';
-  return answer.healthy && !answer.stuck ? kDone : kFailed;
+  return answer.works() ? kDone : kFailed;
 }
 
 // `railfix train` compares them: programs that were made of different ones do not hear each other.
@@ -151,6 +152,22 @@ void CommonConfig::describe(Fields& fields) {
               "Use data in turns and answer on data_progress; set by `railfix run --pace lossless`.");
 }
 
+core::Status CommonConfig::check() const {
+  for (const auto& [key, name] : {std::pair{"train_id", train_id}, std::pair{"host", host}}) {
+    if (!is_name(name))
+      return core::Error{std::string("common.") + key + " '" + name +
+                         "' is no name of at most 64 letters, digits, '-', '_' and '.', such as re460-042"};
+  }
+  return {};
+}
+
+bool is_name(const std::string& text) {
+  return !text.empty() && text.size() <= 64 &&
+         std::all_of(text.begin(), text.end(),
+                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; }) &&
+         text.front() != '.' && text.front() != '-';
+}
+
 const std::vector<std::string>& service_names() {
   static const std::vector<std::string> names{"frame_grabber", "sensor_gateway", "track_detector",
                                               "odometry",      "map_matcher",    "fusion",
@@ -187,6 +204,7 @@ int run_program(const Program& program, int argc, char** argv) {
     const auto overrides = overrides_of(line.sets);
     const auto common =
         core::value_or_throw(read_config<CommonConfig>("common", line.config, overrides, service_names()));
+    core::ok_or_throw(common.check());
     if (line.health) return say_health(common, program.name);
     core::ok_or_throw(program.read(line.config, overrides));
     if (line.check) return say_topics();

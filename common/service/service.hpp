@@ -46,7 +46,11 @@ struct CommonConfig {
   std::string security;
   bool lock_step = false;
   void describe(Fields& fields);
+  [[nodiscard]] core::Status check() const;
 };
+
+/// A name that can stand in a DDS partition, a file name and a systemd unit.
+bool is_name(const std::string& text);
 
 /// What a service that works sends, so that who asks how it is can tell whether data flows through it.
 enum class Flow {

@@ -1,4 +1,4 @@
-// YAML in a file.
+// YAML that people write, in files and on the command line.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -7,27 +7,18 @@
 #include <string>
 
 #include "core/result.hpp"
-#include "core/whole_file.hpp"
 
 namespace railfix::service {
 
 /// Throws YAML::BadFile where the file cannot be read (of a folder YAML::LoadFile() throws what is no YAML::Exception).
-inline YAML::Node load_yaml(const std::filesystem::path& file) {
-  const auto text = core::read_whole(file);
-  if (!text.ok()) throw YAML::BadFile(file.string());
-  return YAML::Load(text.value());
-}
+YAML::Node load_yaml(const std::filesystem::path& file);
 
-/// An error names the file, and the line or, where it cannot be read, what to do.
-inline core::Result<YAML::Node> read_yaml(const std::filesystem::path& file, const std::string& remedy) {
-  try {
-    return load_yaml(file);
-  } catch (const YAML::BadFile&) {
-    return core::Error{file.string() + " cannot be opened; " + remedy};
-  } catch (const YAML::Exception& error) {
-    return core::Error{file.string() + " line " + std::to_string(error.mark.line + 1) +
-                       ": not valid YAML: " + error.msg};
-  }
-}
+/// An error names the file, and the line or, where it cannot be read, what to do. What the parser would leave out
+/// silently is an error, too: of two values of a key the second, and everything behind the first document.
+core::Result<YAML::Node> read_yaml(const std::filesystem::path& file, const std::string& remedy);
+
+/// The value in --set section.key=VALUE: the text as it stands, as names of files may look like anything. Only what
+/// begins with [, {, " or ' is YAML; throws YAML::Exception where that is none.
+YAML::Node value_of_set(const std::string& text);
 
 }  // namespace railfix::service

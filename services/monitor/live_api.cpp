@@ -21,7 +21,7 @@ std::string word(const json& object, const char* key) {
 }  // namespace
 
 std::string text_of(const json& json) {
-  return json.dump(-1, ' ', false, json::error_handler_t::replace);
+  return core::json_text(json);
 }
 
 void LiveApi::opened(const ClientPtr& client) {

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "commands.hpp"
+#include "core/json_text.hpp"
 #include "core/result.hpp"
 #include "core/units.hpp"
 #include "dataset/dataset.hpp"
@@ -259,7 +260,7 @@ int calibrate_mount(const MountArguments& arguments) {
   const auto& picture = pictures[pictures.size() / 2];
   draw(drawn, in_colour(path, picture), picture, calibration.intrinsics, *calibration.mount, arguments.gauge_m);
   if (arguments.json) {
-    std::cout << json_of(found.value(), calibration.intrinsics, !remark.empty()).dump(2) << '\n';
+    std::cout << core::json_text(json_of(found.value(), calibration.intrinsics, !remark.empty()), 2) << '\n';
   } else {
     print(found.value(), roll, remark);
     std::printf("written to %s; look at %s: straight rails must lie in the yellow lines\n", arguments.out.c_str(),

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "core/json_text.hpp"
 #include "core/time.hpp"
 #include "dataset/dataset.hpp"
 #include "frame_grabber/live_camera.hpp"
@@ -162,7 +163,7 @@ int calibrate(LensArguments arguments) {
                                 : arguments.draw;
   core::ok_or_throw(write_picture(drawn, draw_lens(found.value(), boards.picture, boards.views[boards.pictured])));
   if (arguments.json) {
-    std::cout << json_of(found.value(), boards).dump(2) << '\n';
+    std::cout << core::json_text(json_of(found.value(), boards), 2) << '\n';
     return 0;
   }
   print(found.value(), boards);

@@ -17,14 +17,17 @@ std::vector<Finding> check_services(const TrainOptions& options) {
   const auto plan = folder.plan();
   if (!plan || plan->down) return findings;
   if (!supervisor_of(folder)) {
-    if (any_runs(folder))
-      findings.push_back({true, "services run without a supervisor: railfix train up " + plan->train() +
-                                    at_root(options.root) + " starts it"});
+    const auto starts = "railfix train up " + plan->train() + at_root(options.root) + " starts it";
+    findings.push_back({true, any_runs(folder) ? "services run without a supervisor: " + starts
+                                               : "train " + plan->train_id +
+                                                     " does not run here, neither its services nor their "
+                                                     "supervisor, and nobody has taken it down: " +
+                                                     starts});
     return findings;
   }
   for (const auto& service : plan->services) {
     const auto health = health_of(*plan, folder.state(), service.name);
-    if (!health.healthy || health.degraded) findings.push_back({!health.healthy, service.name + " " + health.text});
+    if (!health.works() || health.degraded) findings.push_back({!health.works(), service.name + " " + health.text});
   }
   return findings;
 }

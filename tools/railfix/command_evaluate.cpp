@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "core/json_text.hpp"
 #include "core/result.hpp"
 #include "core/whole_file.hpp"
 #include "evaluation/evaluation.hpp"
@@ -31,7 +32,7 @@ int evaluate(const EvaluateOptions& options) {
     const auto name = std::filesystem::absolute(options.run + "/").parent_path().filename().string();
     core::ok_or_throw(core::write_whole(options.report, evaluation::html_report(truth, result, name)));
   }
-  const std::string json = evaluation::to_json(result).dump(2) + "\n";
+  const std::string json = core::json_text(evaluation::to_json(result), 2) + "\n";
   if (options.json == "-") {
     std::cout << json;
     return 0;

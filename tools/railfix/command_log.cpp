@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "core/json_text.hpp"
 #include "core/result.hpp"
 #include "mcap/reader.hpp"
 #include "messaging/message_words.hpp"
@@ -39,13 +40,12 @@ void print(const LogOptions& options, const msg::LogRecord& record) {
   if (!wanted(options, record)) return;
   const std::string level = messaging::name_of_level(record.level());
   if (options.json) {
-    std::cout << nlohmann::ordered_json{{"time", utc_text(record.stamp_ns())},
-                                        {"service", record.service().c_str()},
-                                        {"host", record.host().c_str()},
-                                        {"level", level},
-                                        {"text", record.text().c_str()}}
-                     .dump()
-              << std::endl;
+    const nlohmann::ordered_json json{{"time", utc_text(record.stamp_ns())},
+                                      {"service", record.service().c_str()},
+                                      {"host", record.host().c_str()},
+                                      {"level", level},
+                                      {"text", record.text().c_str()}};
+    std::cout << core::json_text(json) << std::endl;
     return;
   }
   std::cout << utc_text(record.stamp_ns()) << ' ' << record.service().c_str() << ' ' << level << ": "

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command_recording.hpp"
+#include "core/json_text.hpp"
 #include "core/time.hpp"
 #include "mcap/check.hpp"
 #include "recording/sample_types.hpp"
@@ -193,7 +194,7 @@ int info(const InfoOptions& options) {
   const Info all = read(options);
   const auto json = json_of(options, all);
   if (options.json) {
-    std::cout << json.dump(2) << '\n';
+    std::cout << core::json_text(json, 2) << '\n';
   } else {
     print(json);
   }

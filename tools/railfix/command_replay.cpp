@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "core/json_text.hpp"
 #include "core/time.hpp"
 #include "key_reader.hpp"
 #include "not_negative.hpp"
@@ -78,11 +79,10 @@ ReplayReport play(Player& player) {
 
 void print(const ReplayReport& report, const CommandLine& line) {
   if (line.json) {
-    std::cout << nlohmann::ordered_json{{"samples", report.samples},         {"topics", report.topics},
-                                        {"late_p50_ms", report.late_p50_ms}, {"late_p99_ms", report.late_p99_ms},
-                                        {"late_max_ms", report.late_max_ms}, {"problems", report.problems}}
-                     .dump(2)
-              << '\n';
+    const nlohmann::ordered_json json{{"samples", report.samples},         {"topics", report.topics},
+                                      {"late_p50_ms", report.late_p50_ms}, {"late_p99_ms", report.late_p99_ms},
+                                      {"late_max_ms", report.late_max_ms}, {"problems", report.problems}};
+    std::cout << core::json_text(json, 2) << '\n';
     return;
   }
   std::cout << report.samples << " samples of " << report.topics << " topics published for "

@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "commands.hpp"
+#include "core/joined.hpp"
 #include "core/result.hpp"
 #include "number_between.hpp"
 #include "progress.hpp"
@@ -82,28 +83,29 @@ void say_where_to_watch(Supervisor& supervisor, Processes& processes, const RunO
             << (options.out / "log" / "monitor.log").string() << '\n';
 }
 
-// Until the data has ended, was interrupted, or a service has died.
-void watch(Supervisor& supervisor, Processes& processes, const RunPlan& plan) {
+const char* source_of(const RunPlan& plan) {
+  return plan.has_camera ? "frame_grabber" : "sensor_gateway";
+}
+
+// Until the data has ended or was interrupted. Error: a service has died or is silent.
+core::Status watch(Supervisor& supervisor, Processes& processes, const RunPlan& plan, const RunOptions& options) {
   LiveTable table;
   Progress progress("run", plan.pictures.value_or(0), !plan.lossless);
-  while (!supervisor.drained() && interrupted == 0) {
+  std::optional<std::string> ended;
+  while (!ended && !supervisor.drained(source_of(plan)) && interrupted == 0) {
     supervisor.turn(kTurnS);
-    if (const auto ended = processes.unexpected_end()) throw std::runtime_error(*ended);
+    ended = processes.unexpected_end();
     if (!plan.lossless) table.update(supervisor.picture());
     progress.update(supervisor.picture().views);
   }
   progress.finish();
   table.finish(supervisor.picture());
-}
-
-// The recorder goes last, so that it hears everyone's last words.
-void stop_services(Processes& processes) {
-  auto before = processes.running();
-  std::erase(before, "recorder");
-  for (const auto& group : {before, std::vector<std::string>{"recorder"}}) {
-    const auto stopped = processes.stop(group, kStopS);
-    if (!stopped.ok()) throw std::runtime_error(stopped.error().message);
-  }
+  if (ended) return core::Error{*ended};
+  const auto lost = supervisor.lost();
+  if (lost.empty() || interrupted != 0) return {};
+  return core::Error{core::joined(lost) +
+                     " said nothing any more before the run ended: dead or frozen; what was said before stands in " +
+                     (options.out / "log").string()};
 }
 
 // Nobody goes on from a run.
@@ -114,6 +116,23 @@ void remove_notes(const std::string& train_id) {
     std::error_code not_there;
     std::filesystem::remove(service::notes_path(common, name), not_there);
   }
+}
+
+// Of a run that has failed, too, which is told after.
+void write_tables(const RunOptions& options, const core::Status& watched, const core::Status& stopped) {
+  const auto tables = export_tables(options.out / "recording.mcap", options.out);
+  if (tables.ok()) {
+    for (const auto& problem : tables.value().problems) std::cerr << "railfix: " << problem << '\n';
+  }
+  std::string failed;
+  for (const auto& status : {watched, stopped}) {
+    if (!status.ok()) failed += (failed.empty() ? "" : "\n") + status.error().message;
+  }
+  if (failed.empty()) return core::ok_or_throw(tables.ok() ? core::Status() : tables.error());
+  if (tables.ok())
+    failed += std::string(failed.ends_with('\n') ? "" : "\n") + "what was recorded until then is in " +
+              options.out.string() + ": recording.mcap and its tables";
+  throw std::runtime_error(failed);
 }
 
 int run(const RunOptions& options) {
@@ -133,15 +152,12 @@ int run(const RunOptions& options) {
   const auto connected = supervisor.wait_connected(processes, kConnectS);
   if (!connected.ok()) throw std::runtime_error(connected.error().message);
   say_where_to_watch(supervisor, processes, options);
-  const auto started =
-      supervisor.command(processes, plan.has_camera ? "frame_grabber" : "sensor_gateway", "start", "", kAnswerS);
+  const auto started = supervisor.command(processes, source_of(plan), "start", "", kAnswerS);
   if (!started.ok()) throw std::runtime_error(started.error().message);
-  watch(supervisor, processes, plan);
-  stop_services(processes);
+  const auto watched = watch(supervisor, processes, plan, options);
+  const auto stopped = processes.stop_all(kStopS);
   remove_notes(plan.train_id);
-
-  const auto tables = core::value_or_throw(export_tables(options.out / "recording.mcap", options.out));
-  for (const auto& problem : tables.problems) std::cerr << "railfix: " << problem << '\n';
+  write_tables(options, watched, stopped);
   const bool whole = !supervisor.picture().recording_broke_off;
   if (!whole) {
     std::cerr << "railfix: the recorder stopped before the data ended, so that tables and recording.mcap are not of "

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "core/json_text.hpp"
 #include "core/time.hpp"
 #include "key_reader.hpp"
 #include "messaging/message_words.hpp"
@@ -193,7 +194,7 @@ int top(const TopOptions& options) {
   if (options.once || options.json || !terminal) {
     watch.run(options.for_s > 0 ? options.for_s : kOnceS, [] {});
     if (options.json) {
-      std::cout << watch.json().dump(2) << '\n';
+      std::cout << core::json_text(watch.json(), 2) << '\n';
     } else {
       std::cout << watch.table(colours);
     }

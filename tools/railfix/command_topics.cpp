@@ -11,6 +11,7 @@
 #include "cdr/decode.hpp"
 #include "commands.hpp"
 #include "core/joined.hpp"
+#include "core/json_text.hpp"
 #include "core/similar_names.hpp"
 #include "core/time.hpp"
 #include "messaging/topics.hpp"
@@ -96,7 +97,7 @@ int list(const TopicsOptions& options) {
                   static_cast<unsigned long long>(statistics.lost()), type.c_str());
     }
   }
-  if (options.json) std::cout << json.dump(2) << '\n';
+  if (options.json) std::cout << core::json_text(json, 2) << '\n';
   if (names.empty()) std::cerr << nobody_writes(options.network) << '\n';
   return names.empty() ? 1 : 0;
 }
@@ -144,7 +145,7 @@ int watch(const TopicsOptions& options) {
   if (options.json) {
     auto json = whole.json();
     json["topic"] = topic;
-    std::cout << json.dump() << '\n';
+    std::cout << core::json_text(json) << '\n';
   } else if (whole.samples() > 0) {
     std::cout << "all: " << topic << ": " << whole.line() << '\n';
   } else {
@@ -158,7 +159,7 @@ int watch(const TopicsOptions& options) {
 void print_sample(ordered_json sample, double before_s, bool as_json) {
   if (as_json) {
     if (before_s > 0) sample["sent_before_listening_s"] = before_s;
-    std::cout << sample.dump() << std::endl;
+    std::cout << core::json_text(sample) << std::endl;
     return;
   }
   if (before_s > 0) std::cout << fmt::format("sent {:.1f} s before listening:\n", before_s);

@@ -139,7 +139,7 @@ int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
   if (!bytes.empty() && bytes.front() == etcs::kNidPacketReportParameters) {
     const auto packet = core::value_or_throw(etcs::decode_report_parameters(bytes));
     if (json_wanted) {
-      std::cout << etcs::to_json(packet).dump(2) << '\n';
+      std::cout << core::json_text(etcs::to_json(packet), 2) << '\n';
     } else {
       print_packet_58(packet);
     }
@@ -149,7 +149,7 @@ int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
   if (!report.ok()) throw BadInput(report.error().message);
   const auto json = etcs::to_json(report.value(), baseline);
   if (json_wanted) {
-    std::cout << json.dump(2) << '\n';
+    std::cout << core::json_text(json, 2) << '\n';
   } else {
     print_table(json, report.value());
   }

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "command_tpr.hpp"
+#include "core/json_text.hpp"
 #include "core/time.hpp"
 #include "etcs/train_position_report.hpp"
 #include "ground_link/ground_report.hpp"
@@ -80,8 +81,7 @@ void print(const GroundReport& report, Arrival arrival, bool as_json) {
                                       {"baseline", report.baseline},
                                       {"reason", report.reason},
                                       {"hex", etcs::to_hex(report.message)}};
-    // A train's name may be anything.
-    std::printf("%s\n", json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::printf("%s\n", core::json_text(json).c_str());
   }
   std::fflush(stdout);
 }

@@ -7,6 +7,7 @@
 #include "command_train.hpp"
 #include "commands.hpp"
 #include "core/joined.hpp"
+#include "core/json_text.hpp"
 #include "core/result.hpp"
 #include "number_between.hpp"
 #include "train/check.hpp"
@@ -81,7 +82,7 @@ int say_status(const TrainOptions& options) {
     const auto found = state.find(service.name);
     const RunningService process = found == state.end() || !runs ? RunningService{} : found->second;
     const auto health = health_of(plan, runs ? state : HostState{}, service.name);
-    healthy = healthy && health.healthy;
+    healthy = healthy && health.works();
     page += health.serves;
     json["services"].push_back({{"service", service.name},
                                 {"release", service.release},
@@ -89,7 +90,7 @@ int say_status(const TrainOptions& options) {
                                 {"standby", service.standby},
                                 {"pid", process.pid},
                                 {"restarts", process.restarts},
-                                {"healthy", health.healthy},
+                                {"healthy", health.works()},
                                 {"text", health.text}});
     char line[256];
     std::snprintf(line, sizeof(line), "%-15s %-10s %10d %8lld %8d  ", service.name.c_str(), service.release.c_str(),
@@ -99,7 +100,7 @@ int say_status(const TrainOptions& options) {
   if (!page.empty()) json["page"] = page;
   const auto again = "railfix train up " + plan.train() + at_root(options.root);
   if (options.json) {
-    std::cout << json.dump(2) << '\n';
+    std::cout << core::json_text(json, 2) << '\n';
   } else {
     std::cout << "train " << plan.train_id << ", host " << plan.host << ", generation " << plan.generation
               << (plan.down    ? ", down: " + again
@@ -177,7 +178,7 @@ int diff(const TrainOptions& options) {
   const auto now = plan_here(options);
   if (now.train_id != manifest.train_id)
     throw core::BadInput("train " + now.train_id + " was here before, and is down; railfix train up " +
-                         manifest.folder.string() + at_root(options.root) + " starts " + manifest.train_id);
+                         manifest.typed() + at_root(options.root) + " starts " + manifest.train_id);
   size_t changes = 0;
   for (const auto& service : services_on(manifest, host.name)) {
     const auto* runs = now.service(service.name);
@@ -202,7 +203,7 @@ int diff(const TrainOptions& options) {
     std::cout << service.name << ": leaves this host\n";
   }
   std::cout << (changes == 0 ? "nothing to be done"
-                             : "railfix train upgrade " + manifest.folder.string() + at_root(options.root) +
+                             : "railfix train upgrade " + manifest.typed() + at_root(options.root) +
                                    " does it, service by service")
             << '\n';
   return 0;

@@ -15,6 +15,10 @@ HostPlan running_plan_here(const TrainOptions& options) {
   if (plan.down)
     throw core::BadInput("the train is down; railfix train up " + plan.train() + at_root(options.root) +
                          " starts it as the manifest says");
+  // Nobody would start what the plan says, and the new generation would be blamed.
+  if (!supervisor_of(HostFolder(options.root)))
+    throw core::BadInput("no supervisor runs here; railfix train up " + plan.train() + at_root(options.root) +
+                         " starts it");
   return plan;
 }
 
@@ -72,7 +76,7 @@ int train_up(const TrainOptions& options) {
   const bool runs = installed && !installed->down && (supervised || any_runs(folder));
   if (runs) {
     std::cout << "services run here already" << (supervised ? "" : ", without a supervisor: it is started")
-              << "; railfix train diff " << manifest.folder.string()
+              << "; railfix train diff " << manifest.typed()
               << " says what the manifest would change, upgrade does it\n";
     if (supervised) return say_status(options);
   }
@@ -110,7 +114,7 @@ int train_upgrade(const TrainOptions& options) {
   const auto done = roll_out(options.root, plan, gate, say_at_once);
   if (!done.ok() && ended_by != 0)
     return say_interrupted(options, before, plan,
-                           {"railfix train upgrade " + manifest.folder.string() + at_root(options.root),
+                           {"railfix train upgrade " + manifest.typed() + at_root(options.root),
                             "railfix train rollback" + at_root(options.root)});
   if (!done.ok()) throw std::runtime_error(done.error().message);
   std::cout << "generation " << plan.generation << " runs\n";

@@ -104,5 +104,51 @@ TEST_F(RunCommand, WhereTheRecorderStopsInTheMiddleItIsNoWholeRun) {
   EXPECT_THAT(test::slurp(root_ / "warned"), ::testing::HasSubstr("the recorder stopped before the data ended"));
 }
 
+// The process of this run; -1 = there is none.
+pid_t process_of(const std::string& program, const std::string& config) {
+  std::error_code gone;
+  for (const auto& entry : fs::directory_iterator("/proc")) {
+    const auto command = test::slurp(entry.path() / "cmdline");
+    if (fs::read_symlink(entry.path() / "exe", gone).filename() == program && command.find(config) != std::string::npos)
+      return std::stoi(entry.path().filename());
+  }
+  return -1;
+}
+
+TEST_F(RunCommand, AFrozenServiceIsNamedAndTheTablesAreThere) {
+  const auto simulated = test::run_program({"railfix", "simulate", "--no-pictures", "--out", path("seq"), "--start",
+                                            "1:250", "--duration-s", "8", "--dwell-s", "1", "--quiet"},
+                                           kPatienceS);
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  test::Program ran(run("seq", {"--start", "1:250:+"}), {root_ / "said", root_ / "warned", {}});
+  const auto is_said = [&] { return test::slurp(root_ / "said").find("watch it on") != std::string::npos; };
+  for (int turn = 0; !is_said() && turn < 900 && !ran.exit_code(); ++turn)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  ASSERT_TRUE(is_said()) << test::slurp(root_ / "warned");
+  std::this_thread::sleep_for(std::chrono::seconds(2));  // so that there is something in the tables
+  const pid_t frozen = process_of("railfix-tpr-publisher", path("out/run.yaml"));
+  ASSERT_GT(frozen, 1);
+  ASSERT_EQ(kill(frozen, SIGSTOP), 0);
+  for (int turn = 0; turn < 900 && !ran.exit_code(); ++turn)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  ASSERT_TRUE(ran.exit_code()) << "it waits for good";
+  EXPECT_EQ(*ran.exit_code(), 1);
+  EXPECT_THAT(test::slurp(root_ / "warned"),
+              ::testing::HasSubstr("tpr_publisher said nothing any more before the run ended: dead or frozen"));
+  auto states = core::value_or_throw(core::CsvReader::open(root_ / "out/train_state.csv"));
+  EXPECT_TRUE(states.next());
+}
+
+TEST_F(RunCommand, WhatIsSetStandsInItsConfigurationAsItWasTyped) {
+  for (int second = 0; second < 300; ++second)
+    write_picture("pictures/" + std::to_string(1000 + second) + ".png", second % 256);
+  test::Program ran(run("pictures", {"--fps", "1", "--pace", "real", "--set", "recorder.folder=/data/pics #2"}),
+                    {root_ / "said", {}, {}});
+  const auto settings = [&] { return test::slurp(root_ / "out/run.yaml"); };
+  for (int turn = 0; settings().empty() && turn < 600 && !ran.exit_code(); ++turn)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_THAT(settings(), ::testing::HasSubstr("folder: \"/data/pics #2\"")) << test::slurp(root_ / "said");
+}
+
 }  // namespace
 }  // namespace railfix

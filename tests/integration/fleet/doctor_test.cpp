@@ -1,8 +1,13 @@
 // `railfix doctor` as a technician types it beside a train that runs.
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <sys/file.h>
+
+#include <atomic>
+#include <thread>
 
 #include "integration/fleet/fleet_train.hpp"
+#include "service/health_file.hpp"
 
 namespace railfix {
 namespace {
@@ -61,6 +66,41 @@ TEST_F(Doctor, SaysWhatIsWrongWithTheTrainThatRunsHere) {
   EXPECT_TRUE(is_told("error: services run without a supervisor: railfix train up " + manifest() + " --root " + root() +
                       " starts it"))
       << doctor().out;
+}
+
+// A service of this name speaks, and this test is its supervisor: a real one would have to be fed for it.
+TEST_F(Doctor, SaysOfAServiceThatAnswersNothingWhatItSaysOfItself) {
+  const auto home = folder_ / "root/var/lib/railfix-train";
+  fs::create_directories(home);
+  std::ofstream(home / "plan.yaml") << "train_id: " << id_
+                                    << "\nhost: cab\ngeneration: 1\nprevious: 0\nservices: [{name: fusion, release: a, "
+                                       "generation: 1, standby: false, command: [/no/such/program], settings: a}]\n";
+  std::ofstream(home / "state.yaml") << "fusion: {pid: " << getpid() << ", generation: 1, restarts: 0, last_end: ''}\n";
+  const int lock = open((home / "supervisor.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  ASSERT_EQ(flock(lock, LOCK_EX), 0);
+  const auto pid = std::to_string(getpid());
+  ASSERT_EQ(write(lock, pid.data(), pid.size()), static_cast<ssize_t>(pid.size()));
+  service::CommonConfig common;
+  common.train_id = id_;
+  common.host = "cab";
+  std::atomic<bool> ended = false;
+  std::thread fusion([&] {
+    service::HealthFile health(service::health_path(common, "fusion"));
+    msg::ServiceStatus active;
+    active.state(msg::STATE_ACTIVE);
+    while (!ended) {
+      const int64_t now_ns = core::monotonic_ns();
+      health.write(active, {service::Flow::answers, false, now_ns - 10 * core::kNsPerSecond, now_ns, 0});
+      poll(nullptr, 0, 100);
+    }
+  });
+  EXPECT_TRUE(is_told("error: fusion input comes, nothing goes out: active"));
+  const auto told = train({"status", "--root", root()});
+  EXPECT_EQ(told.exit_code, 1) << told.out;
+  EXPECT_FALSE(status("fusion")["healthy"].get<bool>());
+  ended = true;
+  fusion.join();
+  close(lock);  // or `down` would end this test
 }
 
 }  // namespace

@@ -13,6 +13,7 @@ using ::testing::Not;
 class Operator : public FleetTest {
  protected:
   Operator() { write_manifest(RAILFIX_TEST_RELEASE); }
+  [[nodiscard]] fs::path supervisor_lock() const { return folder_ / "root/var/lib/railfix-train/supervisor.lock"; }
 };
 
 TEST_F(Operator, AUserWithoutRightsIsToldHowItIsAndChangesNothing) {
@@ -163,6 +164,50 @@ TEST_F(Operator, AServiceThatRefusesItsConfigurationIsNotWaitedFor) {
   EXPECT_THAT(refused.err,
               HasSubstr("did not pass: fusion does not run: ended with exit code 2: fusion: the wheel has"));
   EXPECT_THAT(refused.err, HasSubstr("runs again"));
+}
+
+TEST_F(Operator, WithoutSupervisorNothingIsUpgradedAndNoGenerationIsBlamed) {
+  ASSERT_EQ(up().exit_code, 0);
+  const auto supervisor = static_cast<pid_t>(std::stoll(test::slurp(supervisor_lock())));
+  ASSERT_GT(supervisor, 1);
+  ASSERT_EQ(kill(supervisor, SIGKILL), 0);
+  ASSERT_TRUE(wait_until([&] { return !lives(supervisor); }));
+  const auto refusal =
+      "railfix: no supervisor runs here; railfix train up " + manifest() + " --root " + root() + " starts it\n";
+  write_manifest(RAILFIX_TEST_RELEASE, ", fusion: { use_gnss: false }");
+  for (const auto& refused : {upgrade("5"), train({"rollback", "--root", root(), "--patience", "5"})}) {
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_EQ(refused.err, refusal);
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "root/var/lib/railfix-train/generations/2"));
+
+  const auto orphans = status();
+  for (const auto& service : orphans["services"]) {
+    ASSERT_GT(service["pid"].get<pid_t>(), 1);
+    kill(service["pid"].get<pid_t>(), SIGKILL);
+  }
+  const auto dead = " does not run here, neither its services nor their supervisor, and nobody has taken it down: ";
+  EXPECT_TRUE(wait_until([&] {
+    const auto doctor = test::run_program({"railfix", "doctor", "--root", root()}, 60);
+    return doctor.exit_code == 1 && doctor.out.find("error: train " + id_ + dead + "railfix train up " + manifest() +
+                                                    " --root " + root()) != std::string::npos;
+  })) << test::run_program({"railfix", "doctor", "--root", root()}, 60).out;
+}
+
+// As on a full disk, which a test cannot fill for everybody.
+TEST_F(Operator, DownEndsEverythingThoughItCannotBeNoted) {
+  ASSERT_EQ(up().exit_code, 0);
+  const auto before = status();
+  const auto plan = folder_ / "root/var/lib/railfix-train/plan.yaml";
+  fs::permissions(plan, fs::perms::owner_write | fs::perms::group_write | fs::perms::others_write,
+                  fs::perm_options::remove);
+  const auto down = train({"down", "--root", root()});
+  fs::permissions(plan, fs::perms::owner_write, fs::perm_options::add);
+  EXPECT_EQ(down.exit_code, 2);
+  EXPECT_THAT(down.err, HasSubstr("the services are stopped, but cannot write " + plan.string()));
+  EXPECT_THAT(down.err, HasSubstr("brings the train up again until that is mended and railfix train down --root " +
+                                  root() + " is typed once more"));
+  for (const auto& service : before["services"]) EXPECT_FALSE(lives(service["pid"].get<pid_t>())) << service;
 }
 
 }  // namespace

@@ -48,6 +48,7 @@ class Talker {
       log("fusion", 2, "goes on");
       log("fusion", 3, "wheel slides");
       log("odometry", 4, "camera is blind");
+      log("recorder", 2, "cut off \xC3");
       say("cab", msg::STATE_DEGRADED, "no wheel");
       if (with_standby_) say("coach", msg::STATE_READY, "stands by, cab is in charge");
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -209,6 +210,13 @@ TEST_F(Terminal, LogFollowsWithAFilter) {
   const auto neither = railfix({"log"});
   EXPECT_EQ(neither.exit_code, 2);
   EXPECT_THAT(neither.err, HasSubstr("give a recording, or -f"));
+}
+
+TEST_F(Terminal, WhatIsNoUtf8DoesNotEndALogAsJson) {
+  const Talker talker(train_);
+  const auto log = railfix({"log", "-f", "--for", "4", "--json", "--service", "recorder"});
+  EXPECT_EQ(log.exit_code, 0) << log.err;
+  EXPECT_EQ(nlohmann::json::parse(log.out.substr(0, log.out.find('\n')), nullptr, false)["text"], "cut off \uFFFD");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "service/service.hpp"
 #include "support/every_setting.hpp"
 
 namespace railfix::service {
@@ -124,6 +125,43 @@ TEST_F(ConfigTest, WholeNumbersAreWrittenInFull) {
   const auto config = read_config<LargeNumbers>("odometry", write("odometry: {nid: 16777216}\n"));
   ASSERT_FALSE(config.ok());
   EXPECT_THAT(config.error().message, HasSubstr("odometry.nid 16777216 is outside 0 to 16777215"));
+}
+
+TEST_F(ConfigTest, WhatTheParserWouldLeaveOutIsRefused) {
+  const auto told = [&](const std::string& text) {
+    return error_of(read_config<Config>("odometry", write(text), {}, {"fusion"}));
+  };
+  EXPECT_THAT(told("odometry:\n  speed_mps: 1\n  inner: {inner_m: 0.5}\n  speed_mps: 2\n"),
+              HasSubstr(".yaml: odometry.speed_mps is given twice, lines 2 and 4; remove one"));
+  EXPECT_THAT(told("odometry: {inner: {inner_m: 0.5, inner_m: 1}}\n"),
+              HasSubstr("odometry.inner.inner_m is given twice, line 1; remove one"));
+  EXPECT_THAT(told("odometry: {count: 2}\nfusion: {a: [{b: 1, b: 2}]}\nodometry: {count: 3}\n"),
+              ::testing::AllOf(HasSubstr("odometry is given twice, lines 1 and 3; remove one"),
+                               HasSubstr("fusion.a.b is given twice")));
+  EXPECT_THAT(told("odometry: {count: 2}\n---\nodometry: {count: 3}\n"),
+              HasSubstr("a second document begins in line 2, and only one is read"));
+  EXPECT_EQ(told("---\nodometry: {count: 2, speed_mps: 2}\nfusion: {count: 2, x: [a, a], y: {a: a}, z: {a: a}}\n...\n"),
+            "no error");
+}
+
+TEST_F(ConfigTest, CommandLineTakesAnyTextAsItStands) {
+  const auto name = [](const std::string& text) {
+    const auto config = read_config<Config>("odometry", {}, {{"odometry.name", text}});
+    return config.ok() ? config.value().name : error_of(config);
+  };
+  for (const char* text : {"/data/pics #2", "a: b", "- a", "&a", "*", "%", "a, b", "@"}) EXPECT_EQ(name(text), text);
+  EXPECT_EQ(name("\"a #2\""), "a #2");
+  EXPECT_EQ(name("'[a]'"), "[a]");
+}
+
+TEST_F(ConfigTest, NamesOfTrainAndHostMustFitIntoThoseOfFiles) {
+  CommonConfig common;
+  EXPECT_TRUE(common.check().ok());
+  common.train_id = "a/b";
+  EXPECT_THAT(common.check().error().message, HasSubstr("common.train_id 'a/b' is no name of at most 64 letters"));
+  common.train_id = "re460-042";
+  common.host = "";
+  EXPECT_THAT(common.check().error().message, HasSubstr("common.host '' is no name"));
 }
 
 }  // namespace

@@ -79,6 +79,7 @@ TEST_F(HealthFileFlow, OneThatAnswersNothingIsStuck) {
   const auto answer = ask(Flow::answers, 10, 0.1, 5);
   EXPECT_TRUE(answer.stuck);
   EXPECT_TRUE(answer.healthy) << "its supervisor leaves it alone";
+  EXPECT_FALSE(answer.works()) << "an operator is told";
   EXPECT_EQ(answer.text, "input comes, nothing goes out: degraded (last input 0.1 s ago, last output 5.0 s ago)");
   EXPECT_TRUE(ask(Flow::answers, 10, 0.1, -1).stuck);
   EXPECT_FALSE(ask(Flow::answers, 10, 0.1, 0.1).stuck);

@@ -43,5 +43,26 @@ TEST(Loop, ACommandWhoseHandlerThrowsIsAnsweredAndTheServiceGoesOn) {
   EXPECT_TRUE(replies[1].done());
 }
 
+TEST(Loop, WhatItLogsIsCutBetweenTwoCharacters) {
+  CommonConfig common;
+  common.train_id = "long-log-" + std::to_string(getpid());
+  common.domain = 79;
+  Loop loop("recorder", common, false);
+  std::string text;
+  for (int i = 0; i < 700; ++i) text += "ü";
+  std::string heard;
+  loop.on<msg::LogRecord>(messaging::topics::log_record, [&](const msg::LogRecord& record) {
+    heard = record.text().c_str();
+    if (heard.starts_with("ü")) loop.finish("it is heard");
+  });
+  const int64_t deadline_ns = core::monotonic_ns() + 30 * core::kNsPerSecond;
+  loop.every(std::chrono::milliseconds(200), [&] {
+    if (core::monotonic_ns() > deadline_ns) loop.finish("nobody hears it");
+    loop.log().info("{}", text);
+  });
+  loop.turn();
+  EXPECT_EQ(heard, text.substr(0, 1022));
+}
+
 }  // namespace
 }  // namespace railfix::service

@@ -199,5 +199,35 @@ TEST(Examples, HaveNothingMissingButTheirKeys) {
   EXPECT_THAT(missing, Not(Contains(HasSubstr("source is not given"))));
 }
 
+TEST_F(TrainFolder, WhatIsThereTwiceIsTold) {
+  const auto told = [&](const char* replace, const char* by) {
+    const auto read = manifest(kTrain, replace, by);
+    return read.ok() ? "nothing" : read.error().message;
+  };
+  EXPECT_THAT(told("nid_engine: 460042", "nid_engine: 460042\n    nid_engine: 4711"),
+              HasSubstr("train.yaml: settings.tpr_publisher.nid_engine is given twice, lines 21 and 22; remove one"));
+  EXPECT_THAT(told("    odometry: cab\n", "    odometry: cab\n    odometry: coach\n"),
+              HasSubstr("train.services.odometry is given twice, lines 13 and 14; remove one"));
+  EXPECT_THAT(told("    cab: {", "    coach: { address: 10.42.1.13 }\n    cab: {"),
+              HasSubstr("train.hosts.coach is given twice, lines 8 and 10; remove one"));
+  EXPECT_THAT(told("settings:", "---\nsettings:"), HasSubstr("a second document begins in line 19"));
+}
+
+TEST_F(TrainFolder, AFolderForDraftsThatIsNoneIsTold) {
+  write_map();
+  const char* before = getenv("TMPDIR");
+  const std::string usual = before == nullptr ? "" : before;
+  setenv("TMPDIR", "/nonexistent", 1);
+  const auto told = findings();
+  if (before == nullptr) {
+    unsetenv("TMPDIR");
+  } else {
+    setenv("TMPDIR", usual.c_str(), 1);
+  }
+  EXPECT_THAT(told,
+              ElementsAre("settings cannot be checked: TMPDIR (/nonexistent) is no folder; set TMPDIR to one where "
+                          "you may write"));
+}
+
 }  // namespace
 }  // namespace railfix::tool

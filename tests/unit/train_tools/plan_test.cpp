@@ -3,9 +3,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <fstream>
+
+#include "train/log_file.hpp"
 
 namespace railfix::tool {
 namespace {
@@ -79,6 +84,56 @@ TEST_F(HostFiles, ThatAreDamagedAreTold) {
               HasSubstr("a service without a command"));
   write("state.yaml", "fusion: {pid: many}\n");
   EXPECT_THAT(told([&] { return folder_.state(); }), HasSubstr("state.yaml is damaged (yaml-cpp: error at line 1"));
+}
+
+// Services may hold their log for years.
+TEST_F(HostFiles, ALongLogIsKeptOnceAndBeginsAnew) {
+  const auto log = folder_.log("fusion");
+  const auto write_line = [&](const std::string& line) {
+    const int file = open_log(log);
+    ASSERT_GE(file, 0);
+    ASSERT_EQ(::write(file, line.data(), line.size()), static_cast<ssize_t>(line.size()));
+    close(file);
+  };
+  const auto bytes_of = [](const fs::path& file) { return fs::exists(file) ? fs::file_size(file) : 0; };
+  write_line("first");
+  write_line("second");
+  EXPECT_EQ(bytes_of(log), 11U);
+  fs::resize_file(log, 20'000'001);
+  write_line("third");
+  EXPECT_EQ(bytes_of(log), 5U);
+  EXPECT_EQ(bytes_of(log.string() + ".1"), 20'000'001U);
+  fs::resize_file(log, 20'000'002);
+  write_line("fourth");
+  EXPECT_EQ(bytes_of(log.string() + ".1"), 20'000'002U);
+}
+
+TEST_F(HostFiles, CommandsWithSpacesInTheirPathsCanBePasted) {
+  HostPlan plan;
+  plan.train_folder = "/srv/re460";
+  EXPECT_EQ(plan.train() + at_root("/"), "/srv/re460");
+  plan.train_folder = "/srv/the train's";
+  EXPECT_EQ(plan.train() + at_root("/mnt/a b"), "'/srv/the train'\\''s' --root '/mnt/a b'");
+}
+
+TEST_F(HostFiles, ADiskThatIsMountedReadOnlyIsToldAsSuch) {
+  if (geteuid() != 0) GTEST_SKIP() << "needs root, for a mount of its own";
+  fs::create_directories(root_);
+  const pid_t child = fork();
+  if (child == 0) {
+    const bool mounted = unshare(CLONE_NEWNS) == 0 && mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+                         mount("tmpfs", root_.c_str(), "tmpfs", MS_RDONLY, "size=1M") == 0;
+    const auto may = folder_.may_be_changed();
+    const bool told =
+        !may.ok() && may.error().message == root_.string() +
+                                                " is mounted read-only; mount -o remount,rw makes it "
+                                                "writable again, and dmesg says whether the disk is broken";
+    _exit(!mounted ? 2 : told ? 1 : 0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "this user may not mount";
+  EXPECT_EQ(WEXITSTATUS(status), 1);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "map/coverage.hpp"
 #include "map/group_gaps.hpp"
 #include "map/map_commands.hpp"
+#include "map/map_text.hpp"
 #include "number_between.hpp"
 #include "service/service.hpp"
 
@@ -178,7 +179,7 @@ int coverage(const CoverageRequest& request) {
     json.update(coverage_json(path, found));
     json["back"] = coverage_json(path, back);
     json["without_balise_group"] = groups_json(path, group_gaps(path, options));
-    std::cout << json.dump(2) << '\n';
+    print_json(json);
     return 0;
   }
   std::printf("way              %.1f km from %s over the straight way of every switch\n", way_m / 1e3,

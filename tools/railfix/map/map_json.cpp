@@ -1,5 +1,6 @@
 #include <iostream>
 
+#include "core/json_text.hpp"
 #include "map/map_text.hpp"
 
 namespace railfix::tool {
@@ -130,8 +131,7 @@ ordered_json map_json(const track::Map& map) {
 }
 
 void print_json(const ordered_json& json) {
-  // Names come from foreign files; broken UTF-8 in them must not end the listing.
-  std::cout << json.dump(2, ' ', false, ordered_json::error_handler_t::replace) << '\n';
+  std::cout << core::json_text(json, 2) << '\n';
 }
 
 }  // namespace railfix::tool

@@ -23,6 +23,7 @@ namespace {
 
 constexpr size_t kTailLines = 5;
 constexpr int kPollMs = 20;
+constexpr double kRecorderS = 15;
 
 std::string describe(int wait_status) {
   if (WIFSIGNALED(wait_status))
@@ -65,7 +66,7 @@ Processes::Processes(std::filesystem::path log_dir) : log_dir_(std::move(log_dir
 }
 
 Processes::~Processes() {
-  const auto status = stop(running(), 2.0);
+  const auto status = stop_all(2.0);
   static_cast<void>(status);  // nothing is left to be done with it
 }
 
@@ -141,6 +142,15 @@ core::Status Processes::stop(const std::vector<std::string>& services, double pa
     return core::Error{"did not end within " + std::to_string(static_cast<int>(patience_s)) +
                        " s and had to be killed: " + stuck};
   return {};
+}
+
+core::Status Processes::stop_all(double patience_s) {
+  auto before = running();
+  std::erase(before, "recorder");
+  const auto others = stop(before, patience_s);
+  const auto recorder = stop({"recorder"}, kRecorderS);
+  if (others.ok() || recorder.ok()) return others.ok() ? recorder : others;
+  return core::Error{others.error().message + "\n" + recorder.error().message};
 }
 
 }  // namespace railfix::tool

@@ -25,7 +25,7 @@ class Processes {
  public:
   /// Logs go to log_dir/<service>.log.
   explicit Processes(std::filesystem::path log_dir);
-  /// Ends whatever still runs.
+  /// Ends whatever still runs; only the recorder gets its time.
   ~Processes();
   Processes(const Processes&) = delete;
   Processes& operator=(const Processes&) = delete;
@@ -35,6 +35,9 @@ class Processes {
   [[nodiscard]] std::optional<std::string> unexpected_end();
   /// SIGTERM, then waits; SIGKILL for those that have not ended after the patience. Names those.
   core::Status stop(const std::vector<std::string>& services, double patience_s);
+  /// All of them; the recorder goes last, so that it hears everyone's last words, and always gets the time to close its
+  /// file.
+  core::Status stop_all(double patience_s);
   [[nodiscard]] std::vector<std::string> running() const;
 
  private:

@@ -136,14 +136,14 @@ void add_overrides(YAML::Node& settings, const std::vector<std::string>& sets) {
     const size_t equals = set.find('=');
     if (equals == std::string::npos || set.find('.') >= equals) continue;
     try {
-      const YAML::Node value = YAML::Load(set.substr(equals + 1));
+      const YAML::Node value = service::value_of_set(set.substr(equals + 1));
       YAML::Node section = settings;
       std::string key = set.substr(0, equals);
       for (size_t dot = key.find('.'); dot != std::string::npos; dot = key.find('.')) {
         section.reset(section[key.substr(0, dot)]);
         key.erase(0, dot + 1);
       }
-      section[key] = value.IsScalar() ? YAML::Node(value.Scalar()) : value;
+      section[key] = value;
     } catch (const YAML::Exception&) {
       continue;
     }

@@ -1,6 +1,7 @@
 #include "run/supervisor.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 #include "core/time.hpp"
 #include "messaging/connected.hpp"
@@ -11,6 +12,7 @@ namespace {
 constexpr uint8_t kWarningLevel = 3;
 constexpr size_t kLogLines = 5;
 constexpr double kTurnS = 0.05;
+constexpr int64_t kLostNs = 5 * core::kNsPerSecond;
 constexpr int kIdleStatuses = 4;  // one second of statuses without new work
 
 }  // namespace
@@ -137,9 +139,22 @@ core::Result<std::string> Supervisor::command(Processes& processes, const std::s
   return core::Error{service + " did not answer " + command};
 }
 
-bool Supervisor::drained() const {
-  return ended_ && std::all_of(unchanged_.begin(), unchanged_.end(),
-                               [](const auto& entry) { return entry.second >= kIdleStatuses; });
+bool Supervisor::drained(const std::string& source) const {
+  return (ended_ || is_lost(source)) && std::all_of(unchanged_.begin(), unchanged_.end(), [this](const auto& entry) {
+           return entry.second >= kIdleStatuses || is_lost(entry.first);
+         });
+}
+
+std::vector<std::string> Supervisor::lost() const {
+  std::vector<std::string> names;
+  std::ranges::copy_if(services_, std::back_inserter(names), [this](const auto& name) { return is_lost(name); });
+  return names;
+}
+
+// On a busy computer one is silent for a moment now and then.
+bool Supervisor::is_lost(const std::string& service) const {
+  const auto* seen = picture_.services.find(service);
+  return seen != nullptr && picture_.gone(service) && core::wall_ns() - seen->since_ns > kLostNs;
 }
 
 }  // namespace railfix::tool

@@ -43,12 +43,15 @@ class Supervisor {
                                     const std::string& argument, double patience_s);
   /// Handles what has come; returns after at most this time.
   void turn(double seconds);
-  /// The data has ended and every service has used what it got.
-  [[nodiscard]] bool drained() const;
+  /// The data has ended, or who sends it is lost, and every service that is not lost has used what it got.
+  [[nodiscard]] bool drained(const std::string& source) const;
+  /// Of the services: those that nobody waits for, because they have failed, stopped or been silent for some seconds.
+  [[nodiscard]] std::vector<std::string> lost() const;
   [[nodiscard]] const TrainPicture& picture() const { return picture_; }
 
  private:
   [[nodiscard]] std::string missing() const;
+  [[nodiscard]] bool is_lost(const std::string& service) const;
   void note_status(const msg::ServiceStatus& status);
 
   std::vector<std::string> services_;

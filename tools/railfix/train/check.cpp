@@ -3,9 +3,10 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
+#include <cstdlib>
 #include <future>
 
+#include "core/whole_file.hpp"
 #include "dataset/calibration.hpp"
 #include "ground_link/mqtt_client.hpp"
 #include "messaging/qos_match.hpp"
@@ -231,14 +232,29 @@ Answer ask_service(const Manifest& manifest, const TrainHost& host, const Hosted
   return answer({true, text});
 }
 
+std::string folder_of_drafts() {
+  const char* told = std::getenv("TMPDIR");
+  return told == nullptr ? "/tmp" : std::string("TMPDIR (") + told + ")";
+}
+
 void check_services(const Manifest& manifest, const FindProgram& find_program, TrainCheck& check) {
   // Side by side: a container takes half a second.
   std::vector<std::future<Answer>> answers;
   std::vector<fs::path> configs;
+  std::error_code failed;
+  const auto folder = fs::temp_directory_path(failed);
+  if (failed)
+    return error(check.findings, "settings cannot be checked: " + folder_of_drafts() +
+                                     " is no folder; set TMPDIR to one where you may write");
   for (const auto& host : manifest.hosts) {
-    const auto& config = configs.emplace_back(
-        fs::temp_directory_path() / ("railfix-check-" + std::to_string(getpid()) + "-" + host.name + ".yaml"));
-    std::ofstream(config) << render_config(manifest, host, manifest.folder.string());
+    const auto& config =
+        configs.emplace_back(folder / ("railfix-check-" + std::to_string(getpid()) + "-" + host.name + ".yaml"));
+    const auto written = core::write_whole(config, render_config(manifest, host, manifest.folder.string()));
+    if (!written.ok()) {
+      error(check.findings, "settings for " + host.name + " cannot be checked: " + written.error().message +
+                                "; TMPDIR names the folder");
+      continue;
+    }
     for (const auto& service : services_on(manifest, host.name)) {
       answers.push_back(
           std::async(std::launch::async, [&manifest, &host, &find_program, service, file = config.string()] {
@@ -251,7 +267,7 @@ void check_services(const Manifest& manifest, const FindProgram& find_program, T
     if (answer.finding) check.findings.push_back(*std::move(answer.finding));
     check.made_of[answer.service] = std::move(answer.made_of);
   }
-  for (const auto& config : configs) fs::remove(config);
+  for (const auto& config : configs) fs::remove(config, failed);
 }
 
 void check_topics(const Manifest& manifest, TrainCheck& check) {

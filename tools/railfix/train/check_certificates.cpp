@@ -122,12 +122,12 @@ void check_permissions(const Manifest& manifest, const std::string& host, const 
 void check_keys(const Manifest& manifest, const TrainHost& host, Findings& findings) {
   const auto folder = manifest.folder / "security" / host.name;
   if (!fs::exists(folder))  // one reason, one sentence
-    return findings.push_back({true, folder.string() +
-                                         " is missing; make the train's certificates with railfix train keys " +
-                                         manifest.folder.string()});
+    return findings.push_back(
+        {true,
+         folder.string() + " is missing; make the train's certificates with railfix train keys " + manifest.typed()});
   std::vector<std::string> services{kOperator};
   for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
-  const Remedies remedies(manifest.folder.string());
+  const Remedies remedies(manifest.typed());
   for (const auto& service : services) {
     if (check_identity(folder, service, warning_days(manifest.settings), remedies, findings))
       check_permissions(manifest, host.name, service, folder / (service + ".permissions.p7s"), remedies, findings);

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <initializer_list>
-#include <set>
 
+#include "core/shell_word.hpp"
 #include "core/similar_names.hpp"
 #include "messaging/network.hpp"
 #include "service/service.hpp"
@@ -14,13 +14,7 @@
 namespace railfix::tool {
 namespace {
 
-// A name that can stand in a DDS partition, a file name and a systemd unit.
-bool is_name(const std::string& text) {
-  return !text.empty() && text.size() <= 64 &&
-         std::all_of(text.begin(), text.end(),
-                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; }) &&
-         text.front() != '.' && text.front() != '-';
-}
+using service::is_name;
 
 // Of "fusion.use_wheel"; 0 = it is not there.
 int line_of(const YAML::Node& section, const std::string& key) {
@@ -62,12 +56,10 @@ class ManifestReader {
   }
 
   void refuse_unknown(const YAML::Node& section, const std::string& path, const std::vector<std::string>& known) {
-    std::set<std::string> seen;
     for (const auto& entry : section) {
       const std::string key = entry.first.Scalar();
       if (std::find(known.begin(), known.end(), key) == known.end())
         problem(entry.first, path + key, "is not known here; " + core::did_you_mean(key, known));
-      if (!seen.insert(key).second) problem(entry.first, path + key, "is given twice");
     }
   }
 
@@ -115,7 +107,6 @@ class ManifestReader {
       TrainHost host;
       host.name = entry.first.Scalar();
       if (!is_name(host.name)) problem(entry.first, path, "is no name of letters, digits, '-', '_' and '.'");
-      if (manifest_.host(host.name) != nullptr) problem(entry.first, path, "is given twice");
       if (!entry.second.IsMap()) {
         problem(entry.first, path, "needs {address: IPv4 address on the train network}");
         continue;
@@ -241,6 +232,10 @@ std::string with_own_lines(const Manifest& manifest, std::string said, const std
     at += place.size();
   }
   return said;
+}
+
+std::string Manifest::typed() const {
+  return core::shell_word(folder.string());
 }
 
 std::string Manifest::release_of(const TrainService& service) const {

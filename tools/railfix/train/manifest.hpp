@@ -46,6 +46,8 @@ struct Manifest {
   [[nodiscard]] const TrainHost* host_here() const;
   [[nodiscard]] const TrainService* service(const std::string& name) const;
   [[nodiscard]] std::string release_of(const TrainService& service) const;
+  /// Its folder as an operator types it.
+  [[nodiscard]] std::string typed() const;
 };
 
 /// Services of which two may run, one waiting to take over.

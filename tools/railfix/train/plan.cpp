@@ -4,9 +4,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <set>
 
+#include "core/shell_word.hpp"
 #include "core/whole_file.hpp"
 #include "service/yaml_file.hpp"
 #include "train/stands_still.hpp"
@@ -95,13 +97,17 @@ bool PlannedService::runs_beside() const {
          name == "recorder";
 }
 
+std::string HostPlan::train() const {
+  return train_folder.empty() ? "TRAIN" : core::shell_word(train_folder);
+}
+
 const PlannedService* HostPlan::service(const std::string& name) const {
   const auto found = std::find_if(services.begin(), services.end(), [&](const auto& one) { return one.name == name; });
   return found == services.end() ? nullptr : &*found;
 }
 
 std::string at_root(const fs::path& root) {
-  return root == "/" ? "" : " --root " + root.string();
+  return root == "/" ? "" : " --root " + core::shell_word(root.string());
 }
 
 fs::path HostFolder::generation(int number) const {
@@ -113,6 +119,10 @@ core::Status HostFolder::may_be_changed() const {
   fs::path there = folder_;
   while (!fs::exists(there, none) && there.has_relative_path()) there = there.parent_path();
   if (there.empty() || access(there.c_str(), W_OK) == 0) return {};
+  if (errno == EROFS)
+    return core::Error{there.string() +
+                       " is mounted read-only; mount -o remount,rw makes it writable again, and dmesg "
+                       "says whether the disk is broken"};
   return core::Error{"only root, or who may write to " + there.string() + ", changes what runs here; use sudo"};
 }
 

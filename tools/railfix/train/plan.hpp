@@ -47,7 +47,7 @@ struct HostPlan {
   std::string train_folder = {};  // of the train.yaml that was last brought here, absolute; empty = not noted
 
   /// As an operator types it.
-  [[nodiscard]] std::string train() const { return train_folder.empty() ? "TRAIN" : train_folder; }
+  [[nodiscard]] std::string train() const;
   [[nodiscard]] const PlannedService* service(const std::string& name) const;
 };
 

@@ -11,6 +11,7 @@
 
 #include "core/time.hpp"
 #include "train/command_lock.hpp"
+#include "train/log_file.hpp"
 #include "train/made_of.hpp"
 #include "train/render.hpp"
 #include "train/running.hpp"
@@ -32,8 +33,7 @@ core::Status start_supervisor(const fs::path& root) {
   const HostFolder folder(root);
   const auto program = fs::read_symlink("/proc/self/exe").string();
   const auto log_file = folder.log("supervisor");
-  fs::create_directories(log_file.parent_path());
-  const int log = open(log_file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  const int log = open_log(log_file);
   const std::string at = fs::absolute(root).string();
   const pid_t pid = fork();
   if (pid == 0) {
@@ -114,6 +114,34 @@ std::string still_there(const HostFolder& folder) {
   return text;
 }
 
+// That nothing is to run here.
+core::Status write_down(const HostFolder& folder) {
+  const FileLock alone(folder.plan_lock(), kPlanLockS);
+  auto plan = folder.plan();
+  if (!plan) return {};
+  plan->down = true;
+  return folder.write(*plan);
+}
+
+// And their supervisor.
+core::Status end_services(const fs::path& root) {
+  const HostFolder folder(root);
+  if (!supervisor_of(folder)) {
+    if (!any_runs(folder)) return {};
+    // Services whose supervisor has died end in order, too.
+    if (const auto started = start_supervisor(root); !started.ok()) return started;
+  }
+  const auto pid = supervisor_of(folder);
+  if (!pid) return core::Error{"the supervisor does not stay; why stands in " + folder.log("supervisor").string()};
+  if (kill(static_cast<pid_t>(*pid), SIGTERM) != 0)
+    return core::Error{"the supervisor " + std::to_string(*pid) + " cannot be told to end: " + std::strerror(errno)};
+  if (!wait_until(kStopS, [&] { return supervisor_of(folder) != pid && !any_runs(folder); }))
+    return core::Error{"the supervisor " + std::to_string(*pid) + " has not ended its services within " +
+                       std::to_string(static_cast<int>(kStopS)) + " s" + still_there(folder) + "; why stands in " +
+                       folder.log("supervisor").string() + ", or in systemd's journal"};
+  return {};
+}
+
 }  // namespace
 
 std::optional<std::string> runs_another_train(const fs::path& root, const Manifest& manifest) {
@@ -121,7 +149,7 @@ std::optional<std::string> runs_another_train(const fs::path& root, const Manife
   if (!plan || plan->down || plan->train_id == manifest.train_id) return std::nullopt;
   return "this computer runs train " + plan->train_id + "; " + manifest.folder.string() + " is of train " +
          manifest.train_id + ": railfix train down" + at_root(root) + " first, then railfix train up " +
-         manifest.folder.string() + at_root(root);
+         manifest.typed() + at_root(root);
 }
 
 bool any_runs(const HostFolder& folder) {
@@ -245,27 +273,17 @@ core::Status bring_down(const fs::path& root) {
   const HostFolder folder(root);
   // First of all, so that a supervisor that systemd starts again keeps still. Written in any case: who is about to
   // bring the train up sees by it that it was taken down meanwhile.
-  {
-    const FileLock alone(folder.plan_lock(), kPlanLockS);
-    if (auto plan = folder.plan()) {
-      plan->down = true;
-      if (const auto written = folder.write(*plan); !written.ok()) return written;
-    }
-  }
-  if (!supervisor_of(folder)) {
-    if (!any_runs(folder)) return {};
-    // Services whose supervisor has died end in order, too.
-    if (const auto started = start_supervisor(root); !started.ok()) return started;
-  }
-  const auto pid = supervisor_of(folder);
-  if (!pid) return core::Error{"the supervisor does not stay; why stands in " + folder.log("supervisor").string()};
-  if (kill(static_cast<pid_t>(*pid), SIGTERM) != 0)
-    return core::Error{"the supervisor " + std::to_string(*pid) + " cannot be told to end: " + std::strerror(errno)};
-  if (!wait_until(kStopS, [&] { return supervisor_of(folder) != pid && !any_runs(folder); }))
-    return core::Error{"the supervisor " + std::to_string(*pid) + " has not ended its services within " +
-                       std::to_string(static_cast<int>(kStopS)) + " s" + still_there(folder) + "; why stands in " +
-                       folder.log("supervisor").string() + ", or in systemd's journal"};
-  return {};
+  const auto first = write_down(folder);
+  const auto ended = end_services(root);
+  if (first.ok()) return ended;
+  // On a full disk the recorder may have been what filled it.
+  const auto again = write_down(folder);
+  if (again.ok()) return ended;
+  return core::Error{(ended.ok() ? "the services are stopped, but " : ended.error().message + "; and ") +
+                     again.error().message +
+                     "; systemd or a restart of the computer brings the train up again until that is mended and "
+                     "railfix train down" +
+                     at_root(root) + " is typed once more"};
 }
 
 // What another command has written meanwhile stays: `down` above all.

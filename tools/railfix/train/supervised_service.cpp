@@ -13,6 +13,7 @@
 #include "core/cut_text.hpp"
 #include "core/time.hpp"
 #include "service/health_file.hpp"
+#include "train/log_file.hpp"
 #include "train/stands_still.hpp"
 
 namespace railfix::tool {
@@ -216,8 +217,8 @@ void SupervisedService::kill_when_frozen(int64_t now_ns) {
 
 void SupervisedService::start(int64_t now_ns) {
   forget_health();
-  for (const auto& folder : {home_, log_.parent_path()}) fs::create_directories(folder);
-  const int log = open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  fs::create_directories(home_);
+  const int log = open_log(log_);
   log_began_ = log < 0 ? 0 : lseek(log, 0, SEEK_END);
   pid_ = fork();
   if (pid_ == 0) become(service_, beside_, last_end_, home_, log);
