@@ -16,8 +16,9 @@ namespace railfix {
 /// The ground's end: a session at the broker that outlives connections, and what came over it.
 class Ground {
  public:
-  Ground(const std::string& broker, const std::string& name) : probe_topic_("railfix/" + name + "/position_report") {
-    ground_link::MqttOptions options;
+  /// options: how it shows the broker who it is.
+  Ground(const std::string& broker, const std::string& name, ground_link::MqttOptions options = {})
+      : probe_topic_("railfix/" + name + "/position_report") {
     core::ok_or_throw(ground_link::parse_broker(broker, options));
     options.client_id = "ground-" + name;
     options.keep_session = true;

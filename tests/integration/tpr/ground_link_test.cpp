@@ -274,9 +274,16 @@ TEST_F(GroundLinkTest, TlsLetsOnlyTheRightCertificatesIn) {
     ASSERT_TRUE(status_says("train.pem) runs out in 4 days."));
   }
   ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+  ground_link::MqttOptions known;
+  known.ca_file = ours.of("ca.pem");
+  known.certificate_file = ours.of("train.pem");
+  known.key_file = ours.of("train.key");
+  Ground ground(broker.address(), train_, known);
+  ASSERT_TRUE(ground.subscribed());
   test::Program program(secured(ours.of("ca.pem"), ours));
   ASSERT_TRUE(run_until([&] { return connected() && states_.matched_readers() > 0; }, [] {}));
   ASSERT_TRUE(run_for(5));
+  ASSERT_TRUE(run_until([&] { return ground.count() >= 5; }, [&] { write_state(last_.offset_m); })) << reason();
   ASSERT_TRUE(run_until([&] { return status_ && status_->state() == msg::STATE_ACTIVE; },
                         [&] { write_state(last_.offset_m); }));
 }
@@ -304,9 +311,15 @@ TEST_F(GroundLinkTest, APasswordLetsOnlyItsTrainIn) {
     ASSERT_TRUE(status_says("Ground link: not connected"));
   }
   ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+  ground_link::MqttOptions known;
+  known.user = train_;
+  known.password = "right";
+  Ground ground(broker.address(), train_, known);
+  ASSERT_TRUE(ground.subscribed());
   test::Program program(with_password("right"));
   ASSERT_TRUE(run_until([&] { return connected() && states_.matched_readers() > 0; }, [] {}));
   ASSERT_TRUE(run_for(3));
+  ASSERT_TRUE(run_until([&] { return ground.count() >= 3; }, [&] { write_state(last_.offset_m); })) << reason();
   ASSERT_TRUE(
       run_until([&] { return status_ && status_->state() == msg::STATE_ACTIVE; }, [&] { write_state(last_.offset_m); }))
       << reason();
