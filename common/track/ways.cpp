@@ -57,7 +57,15 @@ std::vector<Run> Junctions::after(const Run& run) const {
     for (const bool forward : {true, false}) {
       const Run next{other, forward};
       if ((forward ? other->from_node : other->to_node) != node || next == run.reversed()) continue;
-      if (leads_on(run, next)) found.emplace_back(turn_rad(run, next) + (met->diverging ? kDivergesRad : 0.0), next);
+      if (!leads_on(run, next)) continue;
+      // Both ends of a balloon loop meet the stem: each of the two connections says both.
+      const double cost = turn_rad(run, next) + (met->diverging ? kDivergesRad : 0.0);
+      const auto known = std::ranges::find(found, next, &std::pair<double, Run>::second);
+      if (known == found.end()) {
+        found.emplace_back(cost, next);
+      } else {
+        known->first = std::min(known->first, cost);
+      }
     }
   }
   std::ranges::stable_sort(found, {}, &std::pair<double, Run>::first);

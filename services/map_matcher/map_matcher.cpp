@@ -88,6 +88,7 @@ void MapMatcher::restart() {
   step_.reset();
   chain_ = {};
   rails_seen_ns_ = 0;
+  searched_ns_ = 0;
   matched_m_ = 0;
 }
 
@@ -104,7 +105,9 @@ PlaceFixes MapMatcher::add(const StateInput& state) {
   trouble_ = trouble_at(state);
   if (anew && followed_ && followed_->path() != path) forget_track();  // somebody has told another one
   PlaceFixes fixes;
-  if (chooser_ && state_ && state.track_known) follow_without_camera(fixes);
+  if (!state_) return fixes;
+  if (map_ && parameters_.locate) search_without_camera(fixes);
+  if (chooser_ && state.track_known) follow_without_camera(fixes);
   return fixes;
 }
 
@@ -227,6 +230,16 @@ void MapMatcher::search(const StepInput& step, PlaceFixes& fixes) {
     turn = turn_of_gyro(step_->stamp_ns, step.stamp_ns);
   const auto places = search_.move(turn);
   if (!places.empty()) fixes.push_back(fix_of(FixKind::network, step.stamp_ns, places));
+}
+
+// By gyro and fusion's speed. Behind a longer silence the way begins anew.
+void MapMatcher::search_without_camera(PlaceFixes& fixes) {
+  const int64_t stamp_ns = state_->placed.stamp_ns;
+  const int64_t from_ns = std::exchange(searched_ns_, stamp_ns);
+  if (step_ && std::abs(core::seconds(stamp_ns - step_->stamp_ns)) < kNoCameraS) return;
+  if (from_ns == 0 || stamp_ns <= from_ns || core::seconds(stamp_ns - from_ns) > FollowedPath::kOldStateS) return;
+  const auto places = search_.move(turn_of_gyro(from_ns, stamp_ns));
+  if (!places.empty()) fixes.push_back(fix_of(FixKind::network, stamp_ns, places));
 }
 
 // The odometer is fusion's, which runs on by whatever sensor there is.

@@ -74,6 +74,7 @@ class MapMatcher {
   void search(const StepInput& step, PlaceFixes& fixes);
   void match_shape(const StepInput& step, PlaceFixes& fixes);
   void follow_turning(const StepInput& step, PlaceFixes& fixes);
+  void search_without_camera(PlaceFixes& fixes);
   void follow_without_camera(PlaceFixes& fixes);
   [[nodiscard]] TrackWindow window_at(const Prior& prior) const;
   void move(const Turn& turn, int64_t to_ns);
@@ -107,6 +108,7 @@ class MapMatcher {
   std::optional<TrackChooser> chooser_;
   double matched_m_ = 0;  // odometer at the last match
   int64_t moved_ns_ = 0;  // the chooser has come to this time
+  int64_t searched_ns_ = 0;  // ... and the search, where no camera leads it
   std::string trouble_;
   /// What was said of the track last.
   struct SaidTrack {

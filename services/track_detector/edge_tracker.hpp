@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -70,6 +71,9 @@ struct WallSteps {
   [[nodiscard]] std::optional<double> last() const { return count > 0 ? std::optional(place_m[0]) : std::nullopt; }
 };
 
+/// All rows together, or the lower and the upper ones each by themselves: more is seen so, not all of it of the wall.
+enum class Rows : uint8_t { all, halves };
+
 class EdgeTracker {
  public:
   EdgeTracker();
@@ -79,7 +83,7 @@ class EdgeTracker {
   void forget();
   /// Along the wall at that lateral offset: places in the range where the brightness steps clearly, seen over the near
   /// looks together.
-  [[nodiscard]] WallSteps steps(double wall_m, double from_m, double to_m) const;
+  [[nodiscard]] WallSteps steps(double wall_m, double from_m, double to_m, Rows rows = Rows::all) const;
   /// What stands so far beside the eye leaves the picture so far ahead.
   [[nodiscard]] double leaves_ahead_m(double lateral_m) const;
   /// The newest look that shows what stands there; nothing before any has.
@@ -137,7 +141,7 @@ class EdgeTracker {
   [[nodiscard]] std::optional<SettledEdge> refine(Spot& spot, int sign) const;
   void add(const Relative& relative, const Fit& fit, Pass& pass, SettledEdge& edge) const;
   void place(const Fit& fit, const Pass& pass, SettledEdge& edge) const;
-  [[nodiscard]] double step_at(double place_m, double wall_m) const;
+  [[nodiscard]] double step_at(double place_m, double wall_m, Rows rows) const;
   [[nodiscard]] static Relative itself(const Look& look) { return {&look, 0, 0, 0, 1, 0}; }
   void settle();
 

@@ -32,7 +32,7 @@ std::optional<LookAt> EdgeTracker::last_look_at(double place_m, double lateral_m
 }
 
 // Mean over the near looks, in grey levels, of how much the brightness steps at a place on a wall.
-double EdgeTracker::step_at(double place_m, double wall_m) const {
+double EdgeTracker::step_at(double place_m, double wall_m, Rows rows) const {
   const Look& now = looks_[newest_];
   const double k = now.curvature_per_m;
   const double ahead_m = place_m - now.way_m;
@@ -57,11 +57,12 @@ double EdgeTracker::step_at(double place_m, double wall_m) const {
     for (size_t i = 0; i < 2; ++i) half_sum[i] += of(relative.look->half_step[i]);
     ++n;
   }
+  if (n < kFewestStepLooks) return 0.0;
   const double half = kHalfShare * std::max(std::abs(half_sum[0]), std::abs(half_sum[1]));
-  return n < kFewestStepLooks ? 0.0 : std::max(std::abs(sum), half) / n;
+  return (rows == Rows::all ? std::abs(sum) : half) / n;
 }
 
-WallSteps EdgeTracker::steps(double wall_m, double from_m, double to_m) const {
+WallSteps EdgeTracker::steps(double wall_m, double from_m, double to_m, Rows rows) const {
   WallSteps found;
   if (count_ == 0) return found;
   const auto keep = [&](double top_m) {
@@ -72,7 +73,7 @@ WallSteps EdgeTracker::steps(double wall_m, double from_m, double to_m) const {
   double best_m = 0;
   double least = 0;  // since the last top
   for (double place_m = to_m; place_m > from_m; place_m -= kStepM) {
-    const double step = step_at(place_m, wall_m);
+    const double step = step_at(place_m, wall_m, rows);
     if (step > std::max(best, kClearStep) && kBesideStep * step > least) {
       best = step;
       best_m = place_m;

@@ -67,6 +67,7 @@ class UprightObjects {
   void look_for_exit(const SettledEdge& edge);
   void release(double way_m);
   void release_exit(const EdgeTracker& tracker, double way_m, double beside_grey);
+  [[nodiscard]] double beyond_m(const EdgeTracker& tracker, double place_m) const;
   [[nodiscard]] double exit_hold_m(const EdgeTracker& tracker) const;
   [[nodiscard]] double mean_of_walls_m(double right_m, double left_m) const;
   [[nodiscard]] size_t near_wall() const;

@@ -130,6 +130,17 @@ UprightObjects::End UprightObjects::end_of_both(const std::array<WallSteps, 2>& 
   return end;
 }
 
+// A last piece of wall may be brighter than the land behind it and darker than the haze above that: over all rows no
+// step. How far behind the end half of the rows still show one.
+double UprightObjects::beyond_m(const EdgeTracker& tracker, double place_m) const {
+  double most_m = 0;
+  for (const double wall_m : tunnel_.wall_m) {
+    const auto last_m = tracker.steps(wall_m, place_m + kOneEndM, place_m + kPanelM, Rows::halves).last();
+    if (last_m) most_m = std::max(most_m, *last_m - place_m);
+  }
+  return most_m;
+}
+
 // From so far ahead on an end and the panel that may follow it show no more, even on the wall that is nearer. What the
 // train runs until then is known less well than the end.
 double UprightObjects::exit_hold_m(const EdgeTracker& tracker) const {
@@ -162,6 +173,7 @@ void UprightObjects::release_exit(const EdgeTracker& tracker, double way_m, doub
   }
   // The other wall ended before: this edge may be of what stands behind the tunnel.
   if (!both && apart_m < kPanelM) sigma_m = std::hypot(sigma_m, apart_m);
+  sigma_m = std::hypot(sigma_m, 0.5 * beyond_m(tracker, place_m));
   if (hidden) sigma_m = std::hypot(sigma_m, kHiddenSigmaM);
   objects_.push_back({LandmarkType::portal_out, place_m, 0, sigma_m, first.pictures});
   if (const auto look = tracker.last_look_at(place_m, tunnel_.wall_m[near_wall()])) objects_.back().seen_at(*look);

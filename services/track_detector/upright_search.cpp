@@ -134,7 +134,6 @@ void UprightSearch::sum_up(double lean) {
   }
 }
 
-// A wall's end may be brighter than the land behind it and darker than the haze above that: over all rows no step.
 void UprightSearch::sum_up_halves() {
   for (auto& half : profile_.half_step) std::fill(half.begin(), half.end(), 0.0F);
   for (int row = 0; row < kRows; ++row) {

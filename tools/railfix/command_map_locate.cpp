@@ -24,6 +24,7 @@ struct LocateRequest {
 
 /// Where odometry.csv of a run could not be used.
 struct Breaks {
+  size_t measured = 0;  // rows that could
   int count = 0;
   int64_t last_ns = 0;
   void add(int64_t stamp_ns) {
@@ -55,12 +56,18 @@ core::Result<Breaks> feed(const std::filesystem::path& file, double until_m, map
       started = false;
     }
     if (!measured) continue;
+    ++breaks.measured;
     if (started && at_m != last_m) locator.move(at_m - last_m, rate_rps * dt_s, map_matcher::kYawNoiseRad);
     started = true;
     last_m = at_m;
     last_ns = table.stamp_ns();
   }
   if (const auto read = table.status(); !read.ok()) return read.error();
+  if (breaks.measured == 0) {
+    return core::Error{file.string() +
+                       " has no row in which the camera measured how the train ran and turned; a run without camera "
+                       "cannot be located by it"};
+  }
   return breaks;
 }
 

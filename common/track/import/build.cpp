@@ -132,15 +132,17 @@ class Sources {
     choose_crs();
     for (RailNet& net : nets_) {
       const bool is_surveyed = !net.crs.empty();
+      const size_t first_node = map_.nodes.size();
       append(draft_of(net), map_);
-      if (is_surveyed) add_frogs(map_, kPlanFrogSigmaM);
+      if (is_surveyed) add_frogs(map_, kPlanFrogSigmaM, first_node);
       std::move(net.problems.begin(), net.problems.end(), std::back_inserter(map_.problems));
       out_.plans.include(net.figures);
       take(std::move(net.fit));
     }
     if (!tracks_.empty()) {
+      const size_t first_node = map_.nodes.size();
       append(cut_tracks(std::move(tracks_), cuts_), map_);
-      add_frogs(map_, kSurveyFrogSigmaM);
+      add_frogs(map_, kSurveyFrogSigmaM, first_node);
     }
     const size_t surveyed_edges = map_.edges.size();
     if (!osm_.ways.empty() || map_.edges.empty()) add_osm();
@@ -275,9 +277,9 @@ class Sources {
       if (!elsewhere.empty()) throw core::BadInput(built.error().message + "; " + elsewhere);
     }
     OsmNetwork network = core::value_or_throw(std::move(built));
-    const bool alone = map_.edges.empty();
+    const size_t first_node = map_.nodes.size();
     append(network.draft, map_);
-    if (alone) add_frogs(map_, kMappingFrogSigmaM);
+    add_frogs(map_, kMappingFrogSigmaM, first_node);
     std::ranges::move(network.cuts, std::back_inserter(cuts_));
     std::ranges::move(network.problems, std::back_inserter(map_.problems));
     out_.osm.include(network.figures);

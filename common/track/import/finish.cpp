@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <set>
+#include <span>
 #include <unordered_map>
 
 #include "track/frog.hpp"
@@ -143,10 +144,10 @@ core::Status put_groups(Map& map, const std::vector<VirtualPlace>& places, const
 
 }  // namespace
 
-void add_frogs(Map& map, double sigma_m) {
+void add_frogs(Map& map, double sigma_m, size_t first) {
   std::unordered_map<uint32_t, std::vector<Connection>> ways_at;
   for (const Connection& way : map.connections) ways_at[way.node].push_back(way);
-  for (const Node& node : map.nodes) {
+  for (const Node& node : std::span(map.nodes).subspan(first)) {
     const std::vector<Connection>& ways = ways_at[node.id];
     for (const Connection& way : ways) {
       for (const Connection& straight : ways) {

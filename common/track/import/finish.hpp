@@ -10,9 +10,9 @@
 
 namespace railfix::track {
 
-/// Puts a frog on both branches of every switch, where the gauge faces of the inner rails cross; sigma_m says
-/// how well the source knows the place.
-void add_frogs(Map& map, double sigma_m);
+/// Puts a frog on both branches of every switch from node `first` on (an index of map.nodes), where the gauge faces of
+/// the inner rails cross; sigma_m says how well the source knows the place.
+void add_frogs(Map& map, double sigma_m, size_t first = 0);
 
 /// What virtual balise groups are called: by one NID_C after the other, as one has 16,382 of them at most.
 struct GroupNumbers {

@@ -82,7 +82,7 @@ std::vector<CantPoint> held(std::vector<CantPoint> changes);
 /// How well what was read closes: worst cases over all elements, in metres and radians.
 struct FitFigures {
   size_t elements = 0;
-  double max_end_error_m = 0;        // integrated end of an element against the source's end of it
+  double max_end_error_m = 0;        // of an element, integrated over the source's length, against the source's
   double max_length_change_m = 0;    // of an element, against the source's length
   double max_heading_step_rad = 0;   // from one element to the next
   double max_gap_m = 0;              // from the source's end of one element to its start of the next

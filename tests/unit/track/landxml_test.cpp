@@ -46,6 +46,14 @@ TEST_F(LandXmlTest, ReadsPlanProfileAndCant) {
   EXPECT_LT(read.figures.max_heading_step_rad, 1e-6);
 }
 
+TEST_F(LandXmlTest, AnArcThatDoesNotLeadToItsEndShowsInTheFigures) {
+  std::string text = kSample;
+  EXPECT_LT(core::value_or_throw(read_landxml(write("l.xml", text))).figures.max_end_error_m, 1e-4);
+  const std::string radius = "cw\" radius=\"300\"";
+  text.replace(text.find(radius), radius.size(), "cw\" radius=\"310\"");
+  EXPECT_NEAR(core::value_or_throw(read_landxml(write("w.xml", text))).figures.max_end_error_m, 0.029, 0.002);
+}
+
 // A length that is wrong moves neither profile nor cant: every element says its own station.
 TEST_F(LandXmlTest, StationsOfTheElementsHoldWhereLengthsDoNotAddUp) {
   const auto sample = [](const std::string& length_of_line, const std::string& length_of_arc) {

@@ -10,6 +10,7 @@
 #include "small_map.hpp"
 #include "track/import/finish.hpp"
 #include "track/path.hpp"
+#include "track/ways.hpp"
 
 namespace railfix::track {
 namespace {
@@ -90,6 +91,26 @@ TEST(Network, TellsTheNeighbourOfALooseEnd) {
   EXPECT_THAT(check_topology(map), testing::Contains(HasSubstr("ends loose")));
 }
 
+// A stem, and a loop of three arcs whose ends both meet it.
+TEST(Ways, OfABalloonLoopAreTwoInAndOneOut) {
+  constexpr double kRadiusM = 200;
+  constexpr double kThirdM = kRadiusM * core::kPi / 3;
+  Map map;
+  map.nodes = {{1, NodeKind::end, "", 0, 0}, {2, NodeKind::railway_switch, "", 500, 0}};
+  map.edges.push_back({1, "stem", 1, 2, "1", Alignment::chained({0, 0, core::kPi / 2}, {{500, 0, 0}})});
+  map.edges.push_back({2, "loop", 2, 2, "1",
+                       Alignment::chained({500, 0, core::kPi / 2}, {{kThirdM, -1 / kRadiusM, -1 / kRadiusM},
+                                                                    {5 * kThirdM, 1 / kRadiusM, 1 / kRadiusM},
+                                                                    {kThirdM, -1 / kRadiusM, -1 / kRadiusM}})});
+  map.connections = {{2, 1, 2, false}, {2, 1, 2, true}};
+  const Ways ways(map);
+  EXPECT_EQ(ways.after({&map.edges[0], true}).size(), 2U);
+  const auto& out = ways.after({&map.edges[1], true});
+  ASSERT_EQ(out.size(), 1U);
+  EXPECT_EQ(out[0].edge->id, 1U);
+  EXPECT_FALSE(out[0].forward);
+}
+
 TEST(Slice, HasTheSameGeometry) {
   const Alignment line = Alignment::chained({0, 0, 0.5}, {{100, 0, 0}, {60, 0, 0.004}, {200, 0.004, 0.004}},
                                             {{0, 1, 0}, {150, 4, 60}, {360, 2, 0}}, {{100, 0}, {160, 0.1}});
@@ -118,6 +139,17 @@ TEST(Frogs, LieWhereTheGaugeFacesOfTheInnerRailsCross) {
   EXPECT_NEAR(map.landmarks[2].offset_m, 500 * angle, 1e-6);
   EXPECT_NEAR(map.landmarks[2].lateral_m, 1.435 / 2, 1e-9);
   EXPECT_EQ(map.landmarks[2].edge, 3U);
+}
+
+TEST(Frogs, OfEachFurtherInputComeOnce) {
+  std::vector<std::string> problems;
+  Map map = built(main_and_branch(), problems);
+  add_frogs(map, 0.3);
+  const size_t frogs = map.landmarks.size();
+  const size_t first = map.nodes.size();
+  append(cut_tracks({{"other", "other", Alignment::chained({5000, 0, 0}, {{100, 0, 0}}), {}}}, problems), map);
+  add_frogs(map, 10, first);
+  EXPECT_EQ(map.landmarks.size(), frogs);
 }
 
 TEST(VirtualBalises, AreSpreadAlongTheEdges) {

@@ -160,7 +160,8 @@ class LandXmlReader {
       out_.figures.max_gap_m = std::max(out_.figures.max_gap_m, gap);
       out_.figures.max_heading_step_rad = std::max(out_.figures.max_heading_step_rad, step);
     }
-    const PlanPose end = advance(closed.start, closed.element, closed.element.length_m);
+    const Element as_told{file_length, closed.element.curvature_start_per_m, closed.element.curvature_end_per_m};
+    const PlanPose end = advance(closed.start, as_told, file_length);
     ++out_.figures.elements;
     out_.figures.max_length_change_m = std::max(out_.figures.max_length_change_m, change);
     out_.figures.max_end_error_m =
