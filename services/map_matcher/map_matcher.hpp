@@ -106,8 +106,8 @@ class MapMatcher {
   StepChain chain_;  // of all steps so far
   int64_t rails_seen_ns_ = 0;
   std::optional<TrackChooser> chooser_;
-  double matched_m_ = 0;  // odometer at the last match
-  int64_t moved_ns_ = 0;  // the chooser has come to this time
+  double matched_m_ = 0;     // odometer at the last match
+  int64_t moved_ns_ = 0;     // the chooser has come to this time
   int64_t searched_ns_ = 0;  // ... and the search, where no camera leads it
   std::string trouble_;
   /// What was said of the track last.

@@ -6,9 +6,13 @@
 #include <cmath>
 #include <ctime>
 #include <limits>
+#include <optional>
 #include <utility>
 
+#include "core/random.hpp"
+#include "core/time.hpp"
 #include "core/units.hpp"
+#include "map_matcher/map_matcher.hpp"
 #include "support/sensed_ride.hpp"
 
 namespace railfix::map_matcher {
@@ -223,6 +227,35 @@ TEST_F(NetworkLocatorTest, TwoPlacesThatLookTheSameAreBothNamedAndNeitherIsCerta
   EXPECT_FALSE(location.place_certain());
   EXPECT_NEAR(location.places[0].probability, 0.5, 0.01);
   EXPECT_NEAR(location.places[1].probability, 0.5, 0.01);
+}
+
+TEST_F(NetworkLocatorTest, WithoutACameraGyroAndSpeedLeadTheSearch) {
+  constexpr double kFromM = 700;
+  const auto map = std::make_shared<track::Map>(network_of(lines_)->map());
+  const track::Route route({map->edge(17), true}, 0, 0);
+  MapMatcher matcher({}, map);
+  core::Random random(3);
+  std::optional<PlaceFix> found;
+  double at_m = kFromM;
+  int64_t now_ns = core::kNsPerSecond;
+  for (int state_no = 0; at_m < 4200 && !found; ++state_no) {
+    const bool stands = state_no < 300;
+    const double speed_mps = stands ? 0 : 25;
+    for (int sample = 0; sample < 10; ++sample) {
+      now_ns += core::to_ns(0.01);
+      at_m += 0.01 * speed_mps;
+      matcher.add(GyroInput{route.curvature_at(at_m) * speed_mps + 0.002 + 1e-4 * random.normal(), now_ns});
+    }
+    StateInput state;
+    state.placed = {now_ns, {}, speed_mps, at_m - kFromM, 100, 100};
+    state.track_known = false;
+    state.standstill = stands;
+    for (const PlaceFix& fix : matcher.add(state)) found = fix;
+  }
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->kind, FixKind::network);
+  EXPECT_EQ(found->options.front().place.edge, 17U);
+  EXPECT_NEAR(found->options.front().place.offset_m, at_m, 4 * found->sigma_m);
 }
 
 // Of so many ways that lead to a place one may have been left out that fits better.
