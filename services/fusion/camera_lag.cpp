@@ -70,8 +70,12 @@ std::optional<CameraLag::Lag> CameraLag::lag() const {
   return Lag{fitted_(2), std::sqrt(covariance_(2, 2))};
 }
 
+bool CameraLag::is_narrowed() const {
+  return covariance_(2, 2) < lag_sigma_s() * lag_sigma_s();
+}
+
 void CameraLag::doubt(double sigma_s) {
-  if (covariance_(2, 2) < lag_sigma_s() * lag_sigma_s()) covariance_(2, 2) += sigma_s * sigma_s;
+  if (is_narrowed()) covariance_(2, 2) += sigma_s * sigma_s;
 }
 
 void CameraLag::begin_again(const OdometryInput& step) {
@@ -178,7 +182,7 @@ void CameraLag::compare() {
 
 // What a standing train knows of the ratio and the creep it still knows when it goes on; the clocks run on.
 void CameraLag::pass(double seconds) {
-  if (covariance_(2, 2) < lag_sigma_s() * lag_sigma_s()) {
+  if (is_narrowed()) {
     Eigen::Matrix4d on = Eigen::Matrix4d::Identity();
     on(2, 3) = seconds;
     fitted_ = on * fitted_;

@@ -52,6 +52,8 @@ class CameraLag {
   };
   [[nodiscard]] std::optional<Lag> jump(int64_t stamp_ns, const std::optional<Reading>& picture) const;
   [[nodiscard]] std::optional<double> seen_speed_mps() const;
+  /// The lag is known better than at first: less than that is never known.
+  [[nodiscard]] bool is_narrowed() const;
   void doubt(double sigma_s);
   void begin_again(const OdometryInput& step);
   static std::optional<Reading> reading_at(const Readings& readings, int64_t stamp_ns);

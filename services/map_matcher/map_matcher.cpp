@@ -228,8 +228,12 @@ void MapMatcher::search(const StepInput& step, PlaceFixes& fixes) {
   auto turn = turn_of_camera();
   if (!turn && step_ && core::seconds(step.stamp_ns - step_->stamp_ns) < FollowedPath::kOldStateS)
     turn = turn_of_gyro(step_->stamp_ns, step.stamp_ns);
+  search_by(turn, step.stamp_ns, fixes);
+}
+
+void MapMatcher::search_by(const std::optional<Turn>& turn, int64_t stamp_ns, PlaceFixes& fixes) {
   const auto places = search_.move(turn);
-  if (!places.empty()) fixes.push_back(fix_of(FixKind::network, step.stamp_ns, places));
+  if (!places.empty()) fixes.push_back(fix_of(FixKind::network, stamp_ns, places));
 }
 
 // By gyro and fusion's speed. Behind a longer silence the way begins anew.
@@ -238,8 +242,7 @@ void MapMatcher::search_without_camera(PlaceFixes& fixes) {
   const int64_t from_ns = std::exchange(searched_ns_, stamp_ns);
   if (step_ && std::abs(core::seconds(stamp_ns - step_->stamp_ns)) < kNoCameraS) return;
   if (from_ns == 0 || stamp_ns <= from_ns || core::seconds(stamp_ns - from_ns) > FollowedPath::kOldStateS) return;
-  const auto places = search_.move(turn_of_gyro(from_ns, stamp_ns));
-  if (!places.empty()) fixes.push_back(fix_of(FixKind::network, stamp_ns, places));
+  search_by(turn_of_gyro(from_ns, stamp_ns), stamp_ns, fixes);
 }
 
 // The odometer is fusion's, which runs on by whatever sensor there is.

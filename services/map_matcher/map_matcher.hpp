@@ -72,6 +72,7 @@ class MapMatcher {
   /// The same from the gyro, for as long as the camera cannot say.
   [[nodiscard]] std::optional<Turn> turn_of_gyro(int64_t from_ns, int64_t to_ns) const;
   void search(const StepInput& step, PlaceFixes& fixes);
+  void search_by(const std::optional<Turn>& turn, int64_t stamp_ns, PlaceFixes& fixes);
   void match_shape(const StepInput& step, PlaceFixes& fixes);
   void follow_turning(const StepInput& step, PlaceFixes& fixes);
   void search_without_camera(PlaceFixes& fixes);

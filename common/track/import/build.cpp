@@ -132,18 +132,13 @@ class Sources {
     choose_crs();
     for (RailNet& net : nets_) {
       const bool is_surveyed = !net.crs.empty();
-      const size_t first_node = map_.nodes.size();
-      append(draft_of(net), map_);
+      const size_t first_node = add(draft_of(net));
       if (is_surveyed) add_frogs(map_, kPlanFrogSigmaM, first_node);
       std::move(net.problems.begin(), net.problems.end(), std::back_inserter(map_.problems));
       out_.plans.include(net.figures);
       take(std::move(net.fit));
     }
-    if (!tracks_.empty()) {
-      const size_t first_node = map_.nodes.size();
-      append(cut_tracks(std::move(tracks_), cuts_), map_);
-      add_frogs(map_, kSurveyFrogSigmaM, first_node);
-    }
+    if (!tracks_.empty()) add_frogs(map_, kSurveyFrogSigmaM, add(cut_tracks(std::move(tracks_), cuts_)));
     const size_t surveyed_edges = map_.edges.size();
     if (!osm_.ways.empty() || map_.edges.empty()) add_osm();
     check_crs();
@@ -159,6 +154,13 @@ class Sources {
   }
 
  private:
+  /// The index of its first node.
+  size_t add(const Draft& draft) {
+    const size_t first = map_.nodes.size();
+    append(draft, map_);
+    return first;
+  }
+
   void take(LandXml read, const std::filesystem::path& file) {
     want_crs(read.crs, file);
     std::move(read.tracks.begin(), read.tracks.end(), std::back_inserter(tracks_));
@@ -277,9 +279,7 @@ class Sources {
       if (!elsewhere.empty()) throw core::BadInput(built.error().message + "; " + elsewhere);
     }
     OsmNetwork network = core::value_or_throw(std::move(built));
-    const size_t first_node = map_.nodes.size();
-    append(network.draft, map_);
-    add_frogs(map_, kMappingFrogSigmaM, first_node);
+    add_frogs(map_, kMappingFrogSigmaM, add(network.draft));
     std::ranges::move(network.cuts, std::back_inserter(cuts_));
     std::ranges::move(network.problems, std::back_inserter(map_.problems));
     out_.osm.include(network.figures);

@@ -128,14 +128,16 @@ std::string curve3(const std::string& id, const std::string& attributes, const s
          "</linearLocation></horizontalCurve>";
 }
 
+std::string arc3(const std::string& id, int radius_m, const std::string& element, int begin_m, int end_m) {
+  return curve3(id, "curveType=\"arc\" radius=\"" + std::to_string(radius_m) + "\"",
+                on(element, "posBegin=\"" + std::to_string(begin_m) + "\" posEnd=\"" + std::to_string(end_m) + "\""));
+}
+
 TEST_F(Railml3Plan, ATransitionLeadsToTheArcOnTheNextNetElement) {
   const std::string infrastructure =
-      "<geometryCurves>" +
-      curve3("c1", "curveType=\"arc\" radius=\"1000\"", on("n1", "posBegin=\"700\" posEnd=\"900\"")) +
+      "<geometryCurves>" + arc3("c1", 1000, "n1", 700, 900) +
       curve3("cl", "curveType=\"clothoid\"", on("n1", "posBegin=\"900\" posEnd=\"1000\"")) +
-      curve3("c2", "curveType=\"arc\" radius=\"400\"", on("n2", "posBegin=\"0\" posEnd=\"200\"")) +
-      curve3("c3", "curveType=\"arc\" radius=\"500\"", on("n2", "posBegin=\"700\" posEnd=\"800\"")) +
-      "</geometryCurves>";
+      arc3("c2", 400, "n2", 0, 200) + arc3("c3", 500, "n2", 700, 800) + "</geometryCurves>";
   const auto curvature = [&](const std::string& text, double at_m) {
     return core::value_or_throw(build_map({write("a.railml", text)}, {})).map.edges[0].alignment.curvature_at(at_m);
   };
@@ -149,12 +151,9 @@ TEST_F(Railml3Plan, ATransitionLeadsToTheArcOnTheNextNetElement) {
 }
 
 TEST_F(Railml3Plan, CurvesOnAnotherAreTold) {
-  const std::string infrastructure =
-      "<geometryCurves>" +
-      curve3("c1", "curveType=\"arc\" radius=\"1000\"", on("n1", "posBegin=\"100\" posEnd=\"300\"")) +
-      curve3("c2", "curveType=\"arc\" radius=\"400\"", on("n1", "posBegin=\"150\" posEnd=\"250\"")) +
-      curve3("c3", "curveType=\"arc\" radius=\"800\"", on("n1", "posBegin=\"300\" posEnd=\"400\"")) +
-      "</geometryCurves>";
+  const std::string infrastructure = "<geometryCurves>" + arc3("c1", 1000, "n1", 100, 300) +
+                                     arc3("c2", 400, "n1", 150, 250) + arc3("c3", 800, "n1", 300, 400) +
+                                     "</geometryCurves>";
   const Map map = core::value_or_throw(build_map({write("a.railml", railml3(infrastructure))}, {})).map;
   EXPECT_THAT(map.problems, testing::Contains("<horizontalCurve> \"c2\" begins on another curve of track n1, which "
                                               "holds up to its own end"));

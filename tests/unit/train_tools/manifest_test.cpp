@@ -31,10 +31,6 @@ TEST_F(TrainFolder, IsReadWithServicesInTheOrderOfTheData) {
 }
 
 TEST_F(TrainFolder, MistakesAreToldWithLineKeyAndWayOut) {
-  const auto told = [&](const char* replace, const char* by) {
-    const auto read = manifest(kTrain, replace, by);
-    return read.ok() ? "nothing" : read.error().message;
-  };
   EXPECT_THAT(told("domain: 12", "domain: 512"), HasSubstr("train.yaml line 3: train.domain must be a whole number"));
   EXPECT_THAT(told("domain: 12", "domian: 12"),
               HasSubstr("line 3: train.domian is not known here; did you mean domain?"));
@@ -200,10 +196,6 @@ TEST(Examples, HaveNothingMissingButTheirKeys) {
 }
 
 TEST_F(TrainFolder, WhatIsThereTwiceIsTold) {
-  const auto told = [&](const char* replace, const char* by) {
-    const auto read = manifest(kTrain, replace, by);
-    return read.ok() ? "nothing" : read.error().message;
-  };
   EXPECT_THAT(told("nid_engine: 460042", "nid_engine: 460042\n    nid_engine: 4711"),
               HasSubstr("train.yaml: settings.tpr_publisher.nid_engine is given twice, lines 21 and 22; remove one"));
   EXPECT_THAT(told("    odometry: cab\n", "    odometry: cab\n    odometry: coach\n"),

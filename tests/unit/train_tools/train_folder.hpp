@@ -54,6 +54,11 @@ class TrainFolder : public ::testing::Test {
     std::ofstream(folder_ / "train.yaml") << text;
     return read_manifest(folder_);
   }
+  /// Why the usual train is refused with that instead.
+  std::string told(const std::string& replace, const std::string& by) {
+    const auto read = manifest(kTrain, replace, by);
+    return read.ok() ? "nothing" : read.error().message;
+  }
   std::vector<std::string> findings(const std::string& replace = "", const std::string& by = "",
                                     const std::string& train = kTrain) {
     std::vector<std::string> texts;
