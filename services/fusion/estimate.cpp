@@ -237,10 +237,13 @@ void Estimator::judge_place(TrainEstimate& e) const {
     e.degrade("map_matcher finds some other place far more probable");
   }
   if (place_.told_by == ToldBy::gnss) e.degrade("GNSS alone has told the place: waits for a landmark");
+  if (place_.told_by == ToldBy::start_and_gnss) {
+    e.degrade("the place was only told, and GNSS agrees to some 10 m only: waits for a landmark or curves");
+  }
   if (place_.told_by == ToldBy::start && !place_.wrong_place.lost()) {
     e.degrade(place_.alike_beside ? "the place was only told, and what agrees is the same on a track beside it: waits "
                                     "for a balise or a frog"
-                                  : "the place was only told: waits for a landmark, GNSS or curves");
+                                  : "the place was only told: waits for a landmark or curves");
   }
   if (!place_.path) e.degrade("place on the map not known" + (place_.given_up ? why_given_up(*place_.given_up) : ""));
   if (place_.path &&

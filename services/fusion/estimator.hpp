@@ -63,9 +63,9 @@ struct Interval {
   double front_m = 0;
 };
 
-/// Who has told the place, as long as nothing has confirmed it: the start is somebody's word, and GNSS may be on the
-/// track beside it.
-enum class ToldBy : uint8_t { nobody, start, gnss };
+/// Who has told the place, as long as nothing has confirmed it: the start is somebody's word, GNSS that agrees with it
+/// knows it to some 10 m only, and where it alone has told it, the train may be on the track beside.
+enum class ToldBy : uint8_t { nobody, start, start_and_gnss, gnss };
 
 /// A plain value; events are applied in the order of their stamps (Fusion sees to that).
 class Estimator {

@@ -15,6 +15,7 @@ constexpr double kForgotten = 2.0;  // of a landmark's sigmas is the place's whe
 constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
 constexpr int kCurvesConfirm = 3;    // ... a place that was only told
+constexpr double kSharpGnssM = 2.0;  // one sigma: knows a told start as well as a landmark does
 constexpr double kCorrectedM = 5.0;
 constexpr double kAsFarM = 3.0;
 constexpr double kLoose = 3.0;       // times by what ways differ: then a fix moves the place and hardly a scale
@@ -83,7 +84,9 @@ void Estimator::use(const GnssInput& sample) {
   } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
-    if (confirms_start(sample.tells_track)) place_.told_by = ToldBy::nobody;
+    if (confirms_start(sample.tells_track)) {
+      place_.told_by = once_m <= kSharpGnssM ? ToldBy::nobody : ToldBy::start_and_gnss;
+    }
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
     if (gnss_proven()) place_.wrong_place.found();
   } else if (++gnss.refused >= kRefusalsToIsolate) {
@@ -269,14 +272,16 @@ void Estimator::accept(const FixInput& fix) {
   watched(fix.kind == FixKind::curvature ? Source::curvature : Source::landmark).accept(fix.stamp_ns);
   off_path_.reset();
   // Some curve may fit at a place that nobody has confirmed, though the train turns otherwise than the track there.
-  const bool by_chance =
-      fix.kind == FixKind::curvature && (place_.told_by != ToldBy::nobody || place_.track_doubt.turns_otherwise());
+  const bool far_off = place_.told_by == ToldBy::start || place_.told_by == ToldBy::gnss;
+  const bool by_chance = fix.kind == FixKind::curvature && (far_off || place_.track_doubt.turns_otherwise());
   if (!by_chance) {
     place_.track_doubt.seen_here();
     place_.turned_way.corrected(fix_offer_.residual);
     compare_turns();
   }
-  if (by_chance && std::abs(fix_offer_.residual) < kBendsHereM) confirm_by_curve(fix.tells_track);
+  const bool bends_here = fix.kind == FixKind::curvature && std::abs(fix_offer_.residual) < kBendsHereM;
+  if (by_chance && bends_here) place_.wrong_place.bends_here();
+  if (bends_here) confirm_by_curve(fix.tells_track);
   if (fix.kind == FixKind::network) place_.told_by = ToldBy::nobody;
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by
   // themselves.
@@ -320,13 +325,12 @@ bool Estimator::confirms_start(bool tells_track) {
 void Estimator::confirm_by(const FixInput& landmark) {
   if (is_only_told() && !confirms_start(landmark.tells_track)) return;
   const bool confirms = landmark.sightings_fit == SightingsFit::here || place_.landmarks_agreed >= kLandmarksBelieved;
-  if (place_.told_by == ToldBy::gnss || confirms) place_.told_by = ToldBy::nobody;
+  if (place_.told_by != ToldBy::start || confirms) place_.told_by = ToldBy::nobody;
 }
 
 // One may fit by chance, and there is none on a straight line that lies elsewhere.
 void Estimator::confirm_by_curve(bool tells_track) {
-  place_.wrong_place.bends_here();
-  if (!confirms_start(tells_track)) return;
+  if (place_.told_by != ToldBy::start_and_gnss && !confirms_start(tells_track)) return;
   place_.bends_agreed = place_.track_doubt.turns_otherwise() ? 0 : place_.bends_agreed + 1;
   if (place_.bends_agreed >= kCurvesConfirm) place_.told_by = ToldBy::nobody;
 }

@@ -151,7 +151,7 @@ TEST(LostPlace, IsNoneWhereGnssHoldsThePlaceAndTheIntervalHoldsWhatGnssMayBeWron
     }
   };
   ride(0, 60);
-  EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
+  EXPECT_EQ(state.reason, kToldAndGnss);
   fusion.add(FixInput{at(60), 1, 2100, INFINITY, 0.1, 0, FixKind::track, track::Direction::forward, nullptr,
                       SightingsFit::nowhere});
   EXPECT_EQ(run(fusion, 60, 61, 20).integrity, Integrity::unusable);

@@ -18,7 +18,9 @@ inline int64_t at(double t_s) {
 }
 
 /// Nothing else is wrong.
-inline constexpr const char* kOnlyTold = "the place was only told: waits for a landmark, GNSS or curves";
+inline constexpr const char* kOnlyTold = "the place was only told: waits for a landmark or curves";
+inline constexpr const char* kToldAndGnss =
+    "the place was only told, and GNSS agrees to some 10 m only: waits for a landmark or curves";
 
 /// At constant speed nothing shows that the camera is not late: in these rides it is believed.
 inline constexpr double kAnyLagS = 1;

@@ -58,7 +58,7 @@ TEST(TracksBeside, WhatStandsBesideBothConfirmsNoStartThatWasTold) {
   }
 }
 
-TEST(TracksBeside, GnssConfirmsNoStartBesideAnotherTrack) {
+TEST(TracksBeside, GnssSaysNothingOfAStartBesideAnotherTrack) {
   for (const bool alone : {false, true}) {
     auto map = std::make_shared<track::Map>(*double_track(false));
     if (alone) map->edges.pop_back();
@@ -69,7 +69,7 @@ TEST(TracksBeside, GnssConfirmsNoStartBesideAnotherTrack) {
       fusion.add(GnssInput{at(i + 1), 0, 50 + 20.0 * (i + 1), 1.0, 1});
     }
     const auto state = run(fusion, 40, 40.5, 20);
-    EXPECT_EQ(state.reason, alone ? "" : kAlikeBeside);
+    EXPECT_EQ(state.reason, alone ? kToldAndGnss : kAlikeBeside);
   }
 }
 

@@ -193,10 +193,28 @@ TEST_F(WrongStart, ThatIsRightIsOkFromTheLandmarkOnByWhichTheMatcherIsSureOrTheF
   }
 }
 
-TEST_F(WrongStart, ThatIsRightIsOkFromTheFirstGnssFixOn) {
+TEST_F(WrongStart, ThatGnssAgreesWithIsOkFromTheFirstLandmarkOnOrAtOnceWhereGnssIsSharp) {
+  for (const uint8_t fix : {uint8_t{1}, uint8_t{4}}) {
+    fusion_ = fusion_at(900);
+    t_s_ = 0;
+    go(100, [] {});
+    fusion_.add(GnssInput{at(t_s_), 0, told_m(), 1, fix});
+    EXPECT_EQ(go(1000, [] {}).reason, fix == 4 ? "" : kToldAndGnss);
+    fusion_.add(fix_at(t_s_, told_m(), 1));
+    EXPECT_EQ(go(40, [] {}).reason, "");
+  }
+}
+
+TEST_F(WrongStart, ThatGnssAgreesWithIsOkFromTheThirdCurveOn) {
   go(100, [] {});
   fusion_.add(GnssInput{at(t_s_), 0, told_m(), 1, 1});
-  EXPECT_EQ(go(20, [] {}).reason, "");
+  const auto bend = [&] {
+    fusion_.add(FixInput{at(t_s_), 1, told_m(), 1, 0.9999, 0, FixKind::curvature, track::Direction::forward, {}});
+    return go(100, [] {}).reason;
+  };
+  EXPECT_EQ(bend(), kToldAndGnss);
+  EXPECT_EQ(bend(), kToldAndGnss);
+  EXPECT_EQ(bend(), "");
 }
 
 TEST_F(WrongStart, ThatIsRightIsOkFromTheThirdCurveOnThatFitsToThreeMetres) {
@@ -259,6 +277,24 @@ TEST_P(WrongStartRide, EndsWhereTheTrainIs) {
     found += last.track_known && verdict.placeless > 0 ? 1 : 0;
   }
   EXPECT_GE(found, kRides / 2);
+}
+
+// What GNSS cannot tell apart is never ok.
+TEST(WrongStartNearby, IsNeverOkWhileItIsOutside) {
+  auto plan = train::campaign_plan();
+  plan.start_wrong_m = 40;
+  uint64_t outside = 0;
+  uint64_t ok = 0;
+  for (int ride = 0; ride < 8; ++ride) {
+    const train::TrainSimulation simulation(plan, train::seed_of_run(88004, static_cast<uint64_t>(ride)));
+    auto fusion = core::value_or_throw(Fusion::create({}, simulation.map, simulation.start()));
+    const auto verdict = train::judge(simulation, fusion, 0, {});
+    EXPECT_EQ(verdict.outside_ok, 0U) << "ride " << ride;
+    outside += verdict.outside;
+    ok += verdict.states - verdict.not_ok;
+  }
+  EXPECT_GT(outside, 0U) << "nobody knows at first";
+  EXPECT_GT(ok, 0U) << "it is found";
 }
 
 INSTANTIATE_TEST_SUITE_P(By, WrongStartRide,
