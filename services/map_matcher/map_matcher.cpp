@@ -89,6 +89,7 @@ void MapMatcher::restart() {
   chain_ = {};
   rails_seen_ns_ = 0;
   searched_ns_ = 0;
+  shaped_ns_ = 0;
   matched_m_ = 0;
 }
 
@@ -107,7 +108,9 @@ PlaceFixes MapMatcher::add(const StateInput& state) {
   PlaceFixes fixes;
   if (!state_) return fixes;
   if (map_ && parameters_.locate) search_without_camera(fixes);
-  if (chooser_ && state.track_known) follow_without_camera(fixes);
+  if (!state.track_known || has_pictures()) return fixes;
+  if (chooser_) follow_without_camera(fixes);
+  if (curvature_ && parameters_.use_curvature) match_shape_without_camera(state.placed.stamp_ns, fixes);
   return fixes;
 }
 
@@ -187,26 +190,50 @@ PlaceFixes MapMatcher::add(const StepInput& step) {
 
 void MapMatcher::match_shape(const StepInput& step, PlaceFixes& fixes) {
   if (chain_.broken()) {
-    curvature_->forget();
-    if (exits_) exits_->forget();
+    match_shape_without_camera(step.stamp_ns, fixes);
     return;
   }
+  shaped_ns_ = step.stamp_ns;
   // Where the rails are seen they tell the shape: the body turns some way behind the foot, how far depends on the car.
   const bool rails_seen = std::abs(core::seconds(step.stamp_ns - rails_seen_ns_)) < kRailsFreshS;
   if (!rails_seen && step.frame_to_frame && std::abs(step.step_m) > kShortestStepM &&
       std::abs(step.speed_mps) > parameters_.least_speed_mps) {
-    const double at_m = chain_.odometer_m() - 0.5 * step.step_m;
+    const double at_m = shape_m() - 0.5 * step.step_m;
     const double sigma_per_m = std::hypot(step.yaw_sigma_rad, kYawNoiseRad) / std::abs(step.step_m);
     curvature_->add(at_m, step.yaw_rad / step.step_m, sigma_per_m, CurvatureOf::body);
     if (exits_) exits_->add(at_m, step.yaw_rad / step.step_m, CurvatureOf::body);
   }
+  match_shape(step.stamp_ns, fixes);
+}
+
+// The gyro tells the shape then, along fusion's way. Where it does not, what came before cannot be joined to what
+// comes.
+void MapMatcher::match_shape_without_camera(int64_t to_ns, PlaceFixes& fixes) {
+  const double since_s = core::seconds(to_ns - shaped_ns_);
+  const bool goes_on = std::abs(since_s) < FollowedPath::kOldStateS;  // otherwise the clock was set, or nobody measured
+  if (goes_on && since_s <= 0) return;
+  const auto turn = goes_on ? turn_of_gyro(shaped_ns_, to_ns) : std::nullopt;
+  shaped_ns_ = to_ns;
+  if (!turn) {
+    curvature_->forget();
+    if (exits_) exits_->forget();
+    return;
+  }
+  unseen_m_ += turn->way_m;
+  if (std::abs(turn->way_m) > parameters_.least_speed_mps * turn->duration_s) {
+    curvature_->add(shape_m(), *turn);
+    if (exits_) exits_->add(shape_m() - 0.5 * turn->way_m, turn->turn_rad / turn->way_m, CurvatureOf::body);
+  }
+  match_shape(to_ns, fixes);
+}
+
+void MapMatcher::match_shape(int64_t stamp_ns, PlaceFixes& fixes) {
   // The exit of a curve is a minimum, which would be missed between.
-  if (!exits_ && std::abs(chain_.odometer_m() - matched_m_) < parameters_.match_every_m) return;
-  matched_m_ = chain_.odometer_m();
-  const auto prior = prior_at(step.stamp_ns);
+  if (!exits_ && std::abs(shape_m() - matched_m_) < parameters_.match_every_m) return;
+  matched_m_ = shape_m();
+  const auto prior = prior_at(stamp_ns);
   if (!prior || place_doubt() > 0) return;  // in the wide window of a place in doubt some curve always fits
-  const auto fix = exits_ ? exits_->match(step.stamp_ns, chain_.odometer_m(), *prior)
-                          : curvature_->match(step.stamp_ns, chain_.odometer_m(), *prior);
+  const auto fix = exits_ ? exits_->match(stamp_ns, shape_m(), *prior) : curvature_->match(stamp_ns, shape_m(), *prior);
   if (fix) say(*fix, FixKind::curvature, fixes);
 }
 
@@ -222,6 +249,11 @@ std::optional<Turn> MapMatcher::turn_of_gyro(int64_t from_ns, int64_t to_ns) con
   auto turn = gyro_.between(from_ns, to_ns);
   if (turn) turn->way_m = state_->placed.speed_mps * core::seconds(to_ns - from_ns);
   return turn;
+}
+
+// Odometry says something of each picture, blind or not.
+bool MapMatcher::has_pictures() const {
+  return step_ && std::abs(core::seconds(state_->placed.stamp_ns - step_->stamp_ns)) < kNoCameraS;
 }
 
 void MapMatcher::search(const StepInput& step, PlaceFixes& fixes) {
@@ -240,7 +272,7 @@ void MapMatcher::search_by(const std::optional<Turn>& turn, int64_t stamp_ns, Pl
 void MapMatcher::search_without_camera(PlaceFixes& fixes) {
   const int64_t stamp_ns = state_->placed.stamp_ns;
   const int64_t from_ns = std::exchange(searched_ns_, stamp_ns);
-  if (step_ && std::abs(core::seconds(stamp_ns - step_->stamp_ns)) < kNoCameraS) return;
+  if (has_pictures()) return;
   if (from_ns == 0 || stamp_ns <= from_ns || core::seconds(stamp_ns - from_ns) > FollowedPath::kOldStateS) return;
   search_by(turn_of_gyro(from_ns, stamp_ns), stamp_ns, fixes);
 }
@@ -287,7 +319,6 @@ TrackWindow MapMatcher::window_at(const Prior& prior) const {
 // Without a camera fusion's states lead: they come ten times a second.
 void MapMatcher::follow_without_camera(PlaceFixes& fixes) {
   const int64_t stamp_ns = state_->placed.stamp_ns;
-  if (step_ && std::abs(core::seconds(stamp_ns - step_->stamp_ns)) < kNoCameraS) return;
   if (!prior_at(stamp_ns)) return;
   move_without_camera(stamp_ns);
   say_track(fixes);
@@ -381,7 +412,7 @@ void MapMatcher::add(const ViewInput& view) {
   // foot.
   const double ahead_m =
       std::min(parameters_.view_ahead_m, kRateShare * sigma_per_m / parameters_.view_rate_sigma_per_m2);
-  const double odometer_m = chain_.odometer_m() + step_->speed_mps * dt_s + ahead_m;
+  const double odometer_m = shape_m() + step_->speed_mps * dt_s + ahead_m;
   curvature_->add(odometer_m, view.curvature_per_m, sigma_per_m, CurvatureOf::rails);
   if (exits_) exits_->add(odometer_m, view.curvature_per_m, CurvatureOf::rails);
 }

@@ -73,7 +73,12 @@ class MapMatcher {
   [[nodiscard]] std::optional<Turn> turn_of_gyro(int64_t from_ns, int64_t to_ns) const;
   void search(const StepInput& step, PlaceFixes& fixes);
   void search_by(const std::optional<Turn>& turn, int64_t stamp_ns, PlaceFixes& fixes);
+  [[nodiscard]] bool has_pictures() const;
   void match_shape(const StepInput& step, PlaceFixes& fixes);
+  void match_shape_without_camera(int64_t to_ns, PlaceFixes& fixes);
+  void match_shape(int64_t stamp_ns, PlaceFixes& fixes);
+  /// Odometer of the shape's matchers: the camera's way, and fusion's where that sees nothing.
+  [[nodiscard]] double shape_m() const { return chain_.odometer_m() + unseen_m_; }
   void follow_turning(const StepInput& step, PlaceFixes& fixes);
   void search_without_camera(PlaceFixes& fixes);
   void follow_without_camera(PlaceFixes& fixes);
@@ -107,7 +112,9 @@ class MapMatcher {
   StepChain chain_;  // of all steps so far
   int64_t rails_seen_ns_ = 0;
   std::optional<TrackChooser> chooser_;
-  double matched_m_ = 0;     // odometer at the last match
+  double matched_m_ = 0;     // shape_m() at the last match
+  double unseen_m_ = 0;      // way that no camera measured
+  int64_t shaped_ns_ = 0;    // the shape's matchers have come to this time
   int64_t moved_ns_ = 0;     // the chooser has come to this time
   int64_t searched_ns_ = 0;  // ... and the search, where no camera leads it
   std::string trouble_;

@@ -40,25 +40,40 @@ class CurvatureMatcher::MapCurvature {
 
 void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sigma_per_m, CurvatureOf of) {
   if (!std::isfinite(odometer_m) || !has_sense(ViewInput{curvature_per_m, sigma_per_m * sigma_per_m})) return;
-  const double weight = 1 / (sigma_per_m * sigma_per_m);
-  const auto cell = [this](double m) { return std::floor(m / parameters_.bin_m); };
+  add(Bin{odometer_m, curvature_per_m, 1 / (sigma_per_m * sigma_per_m), of});
+}
+
+void CurvatureMatcher::add(double odometer_m, const Turn& turn) {
+  const double way_m = std::abs(turn.way_m);
+  const double sigma_per_m = turn.sigma_rad / way_m;
+  if (!std::isfinite(odometer_m) || !has_sense(ViewInput{turn.turn_rad / way_m, sigma_per_m * sigma_per_m})) return;
+  add(Bin{odometer_m - 0.5 * turn.way_m, turn.turn_rad / turn.way_m, 1 / (sigma_per_m * sigma_per_m), CurvatureOf::body,
+          turn.bias_rad / turn.way_m});
+}
+
+void CurvatureMatcher::add(const Bin& sample) {
+  const auto cell = [this](const Bin& b) { return std::floor(b.odometer_m / parameters_.bin_m); };
   auto bin = std::find_if(bins_.rbegin(), bins_.rend(),
-                          [&](const Bin& b) { return b.of == of && cell(b.odometer_m) == cell(odometer_m); });
-  if (bin == bins_.rend()) {
-    bins_.push_back({odometer_m, curvature_per_m, weight, of});
-    // A train that runs to and fro does not leave its window: as many as that has, of rails and of the body, are
-    // enough.
-    const auto most_bins = static_cast<size_t>(2 * (parameters_.window_m / parameters_.bin_m + 1));
-    while (bins_.size() > most_bins ||
-           std::abs(bins_.back().odometer_m - bins_.front().odometer_m) > parameters_.window_m) {
-      bins_.pop_front();
-    }
+                          [&](const Bin& b) { return b.of == sample.of && cell(b) == cell(sample); });
+  if (bin != bins_.rend()) {
+    bin->add(sample);
     return;
   }
-  const double part = weight / (bin->weight + weight);
-  bin->odometer_m += part * (odometer_m - bin->odometer_m);
-  bin->curvature_per_m += part * (curvature_per_m - bin->curvature_per_m);
-  bin->weight += weight;
+  bins_.push_back(sample);
+  // A train that runs to and fro does not leave its window: as many as that has, of rails and of the body, are enough.
+  const auto most_bins = static_cast<size_t>(2 * (parameters_.window_m / parameters_.bin_m + 1));
+  while (bins_.size() > most_bins ||
+         std::abs(bins_.back().odometer_m - bins_.front().odometer_m) > parameters_.window_m) {
+    bins_.pop_front();
+  }
+}
+
+void CurvatureMatcher::Bin::add(const Bin& sample) {
+  const double part = sample.weight / (weight + sample.weight);
+  odometer_m += part * (sample.odometer_m - odometer_m);
+  curvature_per_m += part * (sample.curvature_per_m - curvature_per_m);
+  gyro_per_m += part * (sample.gyro_per_m - gyro_per_m);
+  weight += sample.weight;
 }
 
 /// Of the sway at the end of each bin of the body.
@@ -77,7 +92,7 @@ class CurvatureMatcher::SwayFilter {
     before_ = &bin;
     if (begins) {
       variance_ = sway_;
-      bias_ = 0;
+      bias_ = gyro_ = 0;
     }
     const double of_sway = keeps_ - 1;
     const double fresh = sway_ * (1 - keeps_ * keeps_);
@@ -85,9 +100,11 @@ class CurvatureMatcher::SwayFilter {
     const double together = keeps_ * of_sway * variance_ + fresh;
     const double gain = together / unexpected;
     const double of_bias = way_ - of_sway * bias_;
+    const double of_gyro = way_ * bin.gyro_per_m - of_sway * gyro_;
     variance_ = keeps_ * keeps_ * variance_ + fresh - gain * together;
     bias_ = keeps_ * bias_ + gain * of_bias;
-    return {way_, of_sway, keeps_, gain, 1 / unexpected, of_bias, begins};
+    gyro_ = keeps_ * gyro_ + gain * of_gyro;
+    return {way_, of_sway, keeps_, gain, 1 / unexpected, of_bias, of_gyro, begins};
   }
 
  private:
@@ -97,40 +114,52 @@ class CurvatureMatcher::SwayFilter {
   const Bin* before_ = nullptr;
   double way_ = 1;
   double variance_ = 0;  // of the sway that is estimated
-  double bias_ = 0;      // what a constant error of 1 makes of that
+  double bias_ = 0;      // what a constant error of 1 makes of that ...
+  double gyro_ = 0;      // ... and one sigma of the gyro's
 };
 
-std::vector<CurvatureMatcher::Weighing> CurvatureMatcher::weighings() const {
+CurvatureMatcher::Weighings CurvatureMatcher::weighings() const {
   SwayFilter filter(parameters_);
-  std::vector<Weighing> all;
-  all.reserve(bins_.size());
+  Weighings all;
+  all.bins.reserve(bins_.size());
+  double bias = 1 / (parameters_.bias_per_m * parameters_.bias_per_m);
+  double both = 0;
+  double gyro = 1;
   for (const Bin& bin : bins_) {
     const double noise = 1 / bin.weight + parameters_.noise_per_m * parameters_.noise_per_m;
-    all.push_back(bin.of == CurvatureOf::body ? filter.weigh(bin, noise) : Weighing{.weight = 1 / noise});
+    const Weighing as = bin.of == CurvatureOf::body ? filter.weigh(bin, noise) : Weighing{.weight = 1 / noise};
+    bias += as.weight * as.of_bias * as.of_bias;
+    both += as.weight * as.of_bias * as.of_gyro;
+    gyro += as.weight * as.of_gyro * as.of_gyro;
+    all.bins.push_back(as);
   }
+  const double determinant = bias * gyro - both * both;
+  all.bias = gyro / determinant;
+  all.both = -both / determinant;
+  all.gyro = bias / determinant;
   return all;
 }
 
-double CurvatureMatcher::misfit(const MapCurvature& map, const std::vector<Weighing>& weighings, double place_m,
-                                double scale, double lag_m, double odometer_m) const {
+double CurvatureMatcher::misfit(const MapCurvature& map, const Weighings& weighings, double place_m, double scale,
+                                double lag_m, double odometer_m) const {
   double sum = 0;
-  double weighted = 0;
-  double weights = 1 / (parameters_.bias_per_m * parameters_.bias_per_m);
+  double bias = 0;
+  double gyro = 0;
   double sway = 0;
   for (size_t i = 0; i < bins_.size(); ++i) {
     const Bin& bin = bins_[i];
-    const Weighing& as = weighings[i];
+    const Weighing& as = weighings.bins[i];
     const double of_m = place_m - (bin.of == CurvatureOf::body ? lag_m : 0.0);
     double error = as.way * (bin.curvature_per_m - map.at(of_m + (1 + scale) * (bin.odometer_m - odometer_m)));
     if (as.begins) sway = 0;
     error -= as.of_sway * sway;
     sway = as.keeps * sway + as.gain * error;
     sum += as.weight * error * error;
-    weighted += as.weight * as.of_bias * error;
-    weights += as.weight * as.of_bias * as.of_bias;
+    bias += as.weight * as.of_bias * error;
+    gyro += as.weight * as.of_gyro * error;
   }
-  // What is left when the bias takes the value that fits best.
-  return sum - weighted * weighted / weights;
+  // What is left when both constant errors take the values that fit best.
+  return sum - weighings.bias * bias * bias - 2 * weighings.both * bias * gyro - weighings.gyro * gyro * gyro;
 }
 
 bool CurvatureMatcher::any_of_body() const {

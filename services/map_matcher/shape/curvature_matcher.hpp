@@ -39,6 +39,9 @@ class CurvatureMatcher {
 
   /// Curvature (left positive) with its sigma, of the track at this odometer reading.
   void add(double odometer_m, double curvature_per_m, double sigma_per_m, CurvatureOf of);
+  /// How the body turned on the way up to this reading, by a gyro whose constant error is the larger the slower it
+  /// runs.
+  void add(double odometer_m, const Turn& turn);
   /// Another way with distances that go on from the old one's; the measurements so far stay.
   void change_path(std::shared_ptr<const track::Path> path) { path_ = std::move(path); }
   /// The odometer lost the way (camera blind): what came before cannot be used any more.
@@ -56,6 +59,9 @@ class CurvatureMatcher {
     double curvature_per_m = 0;
     double weight = 0;  // of its samples, in m^2: 1 / sigma^2
     CurvatureOf of = CurvatureOf::rails;
+    double gyro_per_m = 0;  // what one sigma of a gyro's constant error makes of it
+
+    void add(const Bin& sample);
   };
   /// How a bin's error is weighed, given those of the bins before: what the body swayed to the one side within a bin it
   /// sways back in the next ones. A Kalman filter of the sway at the bin's end (in 1/m, over bin_m), whose gains depend
@@ -66,10 +72,19 @@ class CurvatureMatcher {
     double keeps = 1;     // ... and in the next one
     double gain = 0;      // of the next sway
     double weight = 0;    // of what is not expected
-    double of_bias = 1;   // a constant error in it
+    double of_bias = 1;   // a constant error in it ...
+    double of_gyro = 0;   // ... and one sigma of the gyro's
     bool begins = false;  // nothing is known of the sway before
   };
+  /// ... and what they leave open of the two constant errors: the inverse of their normal equations.
+  struct Weighings {
+    std::vector<Weighing> bins;
+    double bias = 0;
+    double both = 0;
+    double gyro = 0;
+  };
   class SwayFilter;
+  void add(const Bin& sample);
   struct Peak {
     double offset_m = 0;  // of the place from the prior's
     double sigma_m = 0;
@@ -85,15 +100,15 @@ class CurvatureMatcher {
   };
   class MapCurvature;
   [[nodiscard]] bool any_of_body() const;
-  [[nodiscard]] std::vector<Weighing> weighings() const;
+  [[nodiscard]] Weighings weighings() const;
   /// The best place by a flat prior in the window.
   [[nodiscard]] Peak search(double odometer_m, const Prior& prior) const;
   /// Of every place, lag of the body and scale of the odometer, the scales innermost.
   [[nodiscard]] std::vector<double> misfits(const Window& window, double odometer_m, double expected_m) const;
   [[nodiscard]] std::vector<double> likelihoods(const std::vector<double>& misfits, size_t places) const;
   [[nodiscard]] Peak peak_of(const std::vector<double>& likelihood, const Window& window) const;
-  [[nodiscard]] double misfit(const MapCurvature& map, const std::vector<Weighing>& weighings, double place_m,
-                              double scale, double lag_m, double odometer_m) const;
+  [[nodiscard]] double misfit(const MapCurvature& map, const Weighings& weighings, double place_m, double scale,
+                              double lag_m, double odometer_m) const;
 
   CurvatureParameters parameters_;
   std::shared_ptr<const track::Path> path_;

@@ -12,6 +12,7 @@ constexpr double kMatchEveryM = 5;
 constexpr double kLeastSpeedMps = 1;
 constexpr double kTurnSigmaRad = 2e-4;  // of a step
 constexpr double kLostS = 5;
+constexpr double kOldStateS = map_matcher::FollowedPath::kOldStateS;
 // Curvature from pictures: 9e-5 1/m rms where a sigma of 1.4e-4 is said, over 26 km at 8 degrees.
 constexpr double kSigmaPerM = 1.4e-4;
 constexpr double kWhitePerM = 7e-5;
@@ -67,7 +68,7 @@ void MatcherLoop::look(double arrival_s, const Motion& truth) {
   if (faulty && fault.kind == FaultKind::outliers && wild) seen_per_m += kOutlierPerM;
   if (faulty && fault.kind == FaultKind::stuck) seen_per_m = *(stuck_per_m_ = stuck_per_m_.value_or(seen_per_m));
   if (!simulation_.sees(arrival_s) || (faulty && fault.kind == FaultKind::dropout)) return;
-  shape_->add(chain_.odometer_m(), seen_per_m, kSigmaPerM, CurvatureOf::rails);
+  shape_->add(shape_m(), seen_per_m, kSigmaPerM, CurvatureOf::rails);
 }
 
 void MatcherLoop::found(const map_matcher::Fix& fix, fusion::FixKind kind, double due_s) {
@@ -78,10 +79,10 @@ void MatcherLoop::found(const map_matcher::Fix& fix, fusion::FixKind kind, doubl
 }
 
 void MatcherLoop::match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s) {
-  if (std::abs(chain_.odometer_m() - matched_m_) < kMatchEveryM) return;
-  matched_m_ = chain_.odometer_m();
+  if (std::abs(shape_m() - matched_m_) < kMatchEveryM) return;
+  matched_m_ = shape_m();
   const auto prior = followed_.prior_at(stamp_ns, placed(state));
-  const auto fix = prior ? shape_->match(stamp_ns, chain_.odometer_m(), *prior) : std::nullopt;
+  const auto fix = prior ? shape_->match(stamp_ns, shape_m(), *prior) : std::nullopt;
   if (!fix) return;
   const auto& fault = simulation_.plan().fault;
   const bool late = fault.is(Sensor::shape, FaultKind::delay) && fault.active(arrival_s);
@@ -153,12 +154,45 @@ std::vector<fusion::FixInput> MatcherLoop::see(const fusion::OdometryInput& step
   const bool placed = follow(state);
   look_for_place(step, state, arrival_s);
   match_sightings(state, arrival_s);
-  if (placed && !chain_.broken() && simulation_.plan().shape) {
+  if (!placed || !simulation_.plan().shape) return due_now(arrival_s);
+  if (chain_.broken()) {
+    shape_in_the_dark(step.stamp_ns, state);
+  } else {
+    shaped_ns_ = step.stamp_ns;
     if (std::abs(state.speed_mps) > kLeastSpeedMps) look(arrival_s, simulation_.pictured_at(step.stamp_ns, arrival_s));
-    match_shape(step.stamp_ns, state, arrival_s);
-  } else if (shape_) {
-    shape_->forget();
   }
+  match_shape(step.stamp_ns, state, arrival_s);
+  return due_now(arrival_s);
+}
+
+// As map_matcher does it.
+void MatcherLoop::shape_in_the_dark(int64_t stamp_ns, const fusion::TrainEstimate& state) {
+  const double since_s = core::seconds(stamp_ns - shaped_ns_);
+  if (std::abs(since_s) < kOldStateS && since_s <= 0) return;
+  auto turn = std::abs(since_s) < kOldStateS && std::isfinite(state.speed_mps) ? gyro_.between(shaped_ns_, stamp_ns)
+                                                                               : std::nullopt;
+  shaped_ns_ = stamp_ns;
+  if (!turn) {
+    shape_->forget();
+    return;
+  }
+  turn->way_m = state.speed_mps * since_s;
+  unseen_m_ += turn->way_m;
+  if (std::abs(state.speed_mps) > kLeastSpeedMps) shape_->add(shape_m(), *turn);
+}
+
+std::vector<fusion::FixInput> MatcherLoop::run_on(const fusion::TrainEstimate& state, double arrival_s) {
+  if (stands_since_ns_ != 0 && state.standstill) gyro_.stood(stands_since_ns_, state.stamp_ns);
+  stands_since_ns_ = state.standstill ? state.stamp_ns : 0;
+  if (simulation_.plan().camera || !simulation_.plan().shape) return {};
+  state_ = state;
+  if (!follow(state)) return {};
+  shape_in_the_dark(state.stamp_ns, state);
+  match_shape(state.stamp_ns, state, arrival_s);
+  return due_now(arrival_s);
+}
+
+std::vector<fusion::FixInput> MatcherLoop::due_now(double arrival_s) {
   std::vector<fusion::FixInput> due;
   std::erase_if(found_, [&](auto& one) {
     if (one.first > arrival_s) return false;

@@ -13,6 +13,7 @@
 #include "map_matcher/locate/place_search.hpp"
 #include "map_matcher/shape/curvature_matcher.hpp"
 #include "map_matcher/step_chain.hpp"
+#include "map_matcher/track_choice/gyro_turn.hpp"
 #include "support/train/simulation.hpp"
 
 namespace railfix::train {
@@ -27,9 +28,15 @@ class MatcherLoop {
                                     double arrival_s);
   /// What it finds comes out with the next step.
   void hear(const fusion::GnssInput& gnss, double arrival_s);
+  void feel(const fusion::ImuInput& sample) { gyro_.add(sample.stamp_ns, sample.rate_z_rps); }
+  /// Between pictures. Without a camera the states lead, and what comes out is due now.
+  std::vector<fusion::FixInput> run_on(const fusion::TrainEstimate& state, double arrival_s);
 
  private:
   void match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s);
+  void shape_in_the_dark(int64_t stamp_ns, const fusion::TrainEstimate& state);
+  std::vector<fusion::FixInput> due_now(double arrival_s);
+  [[nodiscard]] double shape_m() const { return chain_.odometer_m() + unseen_m_; }
   void match_sightings(const fusion::TrainEstimate& state, double arrival_s);
   void look_for_place(const fusion::OdometryInput& step, const fusion::TrainEstimate& state, double arrival_s);
   void doubt_place(const fusion::TrainEstimate& state, double due_s);
@@ -42,6 +49,10 @@ class MatcherLoop {
   const TrainSimulation& simulation_;
   map_matcher::FollowedPath followed_;
   map_matcher::StepChain chain_;
+  map_matcher::GyroTurn gyro_{{}};
+  double unseen_m_ = 0;          // way that no camera measured
+  int64_t shaped_ns_ = 0;        // the shape's matcher has come to this time
+  int64_t stands_since_ns_ = 0;  // at the last state; 0: it runs
   std::optional<map_matcher::CurvatureMatcher> shape_;
   std::optional<map_matcher::LandmarkMatcher> landmarks_;
   map_matcher::PlaceSearch search_;

@@ -158,8 +158,13 @@ Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double 
   for (const auto& arrival : simulation.arrivals) {
     if (arrival.arrival_s > simulation.duration_s()) break;
     for (; tick_s < arrival.arrival_s; tick_s += kJudgedEveryS) {
-      if (const auto state = fusion.tick(simulation.stamp_ns(tick_s))) judge.see(*state, tick_s);
+      const auto state = fusion.tick(simulation.stamp_ns(tick_s));
+      if (!state) continue;
+      judge.see(*state, tick_s);
+      if (!matcher) continue;
+      for (const auto& fix : matcher->run_on(*state, tick_s)) fusion.add(fix);
     }
+    if (const auto* imu = std::get_if<fusion::ImuInput>(&arrival.event); matcher && imu != nullptr) matcher->feel(*imu);
     const auto* gnss = std::get_if<fusion::GnssInput>(&arrival.event);
     if (matcher && gnss != nullptr) matcher->hear(*gnss, arrival.arrival_s);
     auto event = arrival.event;

@@ -88,6 +88,20 @@ TEST(Coverage, WheelAloneDriftsInsideItsInterval) {
   EXPECT_EQ(campaign.sum.outside, 0U);
 }
 
+// The gyro tells map_matcher where curves begin and end.
+TEST(Coverage, WithoutACameraCurvesHoldWhatTheWheelMayHaveSlipped) {
+  SimulationPlan plan;
+  plan.camera = plan.gnss = false;
+  plan.landmark_spacing_m = 0;
+  plan.duration_s = 600;
+  for (const bool shape : {false, true}) {
+    plan.shape = shape;
+    const auto campaign = run_campaign(plan, 8);
+    EXPECT_EQ(campaign.sum.outside, 0U);
+    EXPECT_EQ(campaign.budget_share > 0.4, shape) << campaign.budget_share;
+  }
+}
+
 TEST(Coverage, BlindCameraWithImuOnly) {
   SimulationPlan plan;
   plan.wheel = plan.gnss = false;
