@@ -84,8 +84,10 @@ Interval Estimator::interval() const {
   const double silent_s = core::seconds(filter_.stamp_ns() - stamp_ns_);
   const double silent_m = silent_s > kFreshS ? std::abs(filter_.speed_mps()) * silent_s : 0;
   const Sides ways = held_ways();
-  const double behind_m = std::max(bound_m + ways.behind_m, doubts_.refused.behind_m) + doubts_.time_m + silent_m;
-  return {centre_m() - behind_m, centre_m() + std::max(bound_m + ways.ahead_m, doubts_.refused.ahead_m)};
+  Sides held{bound_m + ways.behind_m, bound_m + ways.ahead_m};
+  held.hold(doubts_.refused);
+  held.hold(doubts_.gnss);
+  return {centre_m() - held.behind_m - doubts_.time_m - silent_m, centre_m() + held.ahead_m};
 }
 
 double Estimator::known_to_m() const {
@@ -219,8 +221,7 @@ void Estimator::judge_place(TrainEstimate& e) const {
   if (gnss.isolated) e.degrade("GNSS contradicts the position" + since(gnss.changed_ns));
   const bool turned_away = place_.track_doubt.turns_otherwise() && place_.wrong_place.is_no_position();
   e.place_in_doubt = gnss_denies_place() || turned_away || place_.wrong_place.lost();
-  const bool slides_unseen = gnss.isolated && gnss_proven() && wheel_is_alone();
-  if (gnss_denies_place() || turned_away || slides_unseen) e.integrity = Integrity::unusable;
+  if (gnss_denies_place() || turned_away) e.integrity = Integrity::unusable;
   if (doubts_.time_m > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) e.degrade("a position fix was refused");
   if (corrected_) e.degrade("position was corrected by two fixes against the filter");

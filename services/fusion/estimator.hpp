@@ -253,6 +253,7 @@ class Estimator {
   struct Doubts {
     double odometers_m = 0;  // camera and the rest contradict each other by so much
     double time_m = 0;       // so far behind: time without data may be no time but a clock that was set
+    Sides gnss;              // GNSS that contradicts a wheel alone says that the train is so far away
     Sides refused;           // a fix that was refused, or a surprising one, says that the train is so far away
   };
 
@@ -300,6 +301,7 @@ class Estimator {
   void confirm_by_curve(bool tells_track);
   /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies_place() const;
+  void hold_gnss(double foot_m, double sigma_m, bool contradicts);
   void use_track(const FixInput& fix);
   void doubt_points_behind();
   /// Other ways that the train may have come over, to either side.
@@ -373,6 +375,7 @@ class Estimator {
   std::optional<track::EdgePosition> off_path_;  // a fix was there since the last one that was used
   bool corrected_ = false;                       // the place was moved against the filter's word, not confirmed yet
   int gnss_agreed_ = 0;                          // fixes, since three in a row were refused or one had no place
+  bool gnss_was_proven_ = false;                 // when three in a row were
 
   // What the interval holds beyond the filter's sigma.
   Doubts doubts_;

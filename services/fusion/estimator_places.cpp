@@ -81,6 +81,7 @@ void Estimator::use(const GnssInput& sample) {
   const MeasuredPlace measured{foot_m, kGnssNewShare * once_m, StateIndex::gnss_error, kGnssLastingShare * once_m};
   if (gnss.isolated) {
     gnss.hear(agrees, kAgreementsOfGnss, sample.stamp_ns);
+    hold_gnss(foot_m, once_m, gnss.isolated);
   } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
@@ -90,8 +91,20 @@ void Estimator::use(const GnssInput& sample) {
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
     if (gnss_proven()) place_.wrong_place.found();
   } else if (++gnss.refused >= kRefusalsToIsolate) {
+    gnss_was_proven_ = gnss_proven();
     gnss.isolate(sample.stamp_ns);
     gnss_agreed_ = 0;
+  }
+}
+
+// A wheel that nobody sees may slide, proven GNSS may be wrong: who is, nobody knows. Of the last word of each.
+void Estimator::hold_gnss(double foot_m, double sigma_m, bool contradicts) {
+  if (!contradicts || sees()) {
+    doubts_.gnss = {};
+  } else if (gnss_was_proven_) {
+    const double off_m = foot_m - filter_.path_distance_m();
+    const double reach_m = parameters_->interval_factor * sigma_m;
+    doubts_.gnss = {std::max(0.0, reach_m - off_m), std::max(0.0, reach_m + off_m)};
   }
 }
 

@@ -27,6 +27,7 @@ class Train {
   bool blind = false;  // it says that it sees nothing
   bool wheel = true;   // its samples arrive
   bool imu = true;
+  bool gnss = false;
   double slip = 0;       // share that the wheel counts too much
   double stray = 0;      // ... and the camera
   double noise_m = 0;    // of the wheel's readings
@@ -49,6 +50,7 @@ class Train {
       way_m += step_m;
       wheel_m_ += step_m * (1 + slip);
       ++ticks_;
+      if (gnss && ticks_ % 20 == 0) see(fusion_->add(GnssInput{now(), 0, kStartM + way_m, 1, 1}));
       if (imu) see(fusion_->add(ImuInput{now(), acceleration_mps2 + bias_mps2 + 0.05 * random_.normal(), 0}));
       const double reading_m = wheel_m_ + noise_m * random_.normal();
       if (wheel) see(fusion_->add(WheelInput{now(), static_cast<int64_t>(std::floor(reading_m * 90)), 90}));
@@ -280,6 +282,25 @@ TEST(Wheel, AloneItAdmitsWhatASlipMayAdd) {
   train.run(10);
   EXPECT_NE(train.state->integrity, Integrity::ok);
   EXPECT_THAT(train.state->reason, HasSubstr("nothing would see it slip"));
+}
+
+// Each second it turns a little slower: neither an IMU nor its own readings tell. GNSS does, but may be wrong itself.
+TEST(Wheel, ThatSlidesMoreAndMoreIsHeldByWhatGnssSays) {
+  for (const bool imu : {false, true}) {
+    Train train;
+    train.camera = false;
+    train.imu = imu;
+    train.gnss = true;
+    train.run(20, 1);
+    train.run(60);
+    for (int second = 0; second < 60; ++second) {
+      train.slip -= 0.01;
+      train.run(1);
+    }
+    EXPECT_GT(train.worst_error_m, 100) << imu;
+    EXPECT_THAT(train.state->reason, HasSubstr("GNSS contradicts the position"));
+    EXPECT_NE(train.state->integrity, Integrity::ok);
+  }
 }
 
 TEST(Wheel, ASlipFromTheStandHoldsWithAnImuAndTheWheelComesBack) {
