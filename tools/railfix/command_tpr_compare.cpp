@@ -268,7 +268,8 @@ int compare_reports(const CompareOptions& options) {
   }
   if (ours.left_out() + certified.left_out() > 0) {
     std::printf(
-        "no report can be read    from %zu lines of ours, %zu of the certified: the first are named above, and they are in none of the "
+        "no report can be read    from %zu lines of ours, %zu of the certified: the first are named above, and they "
+        "are in none of the "
         "figures\n",
         ours.left_out(), certified.left_out());
   }
