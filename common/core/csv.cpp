@@ -92,6 +92,12 @@ bool CsvReader::next() {
   return false;
 }
 
+bool CsvReader::pass_over() {
+  if (stream_.bad()) return false;
+  status_ = {};
+  return true;
+}
+
 Result<int64_t> CsvReader::integer(size_t column) const {
   const std::string_view cell = cells_.at(column);
   int64_t value = 0;

@@ -30,6 +30,9 @@ class CsvReader {
   /// status().
   bool next();
   [[nodiscard]] const Status& status() const { return status_; }
+  /// Forgets a row that has too few or too many values, so that next() goes on behind it. False: the file cannot be
+  /// read further.
+  bool pass_over();
 
   [[nodiscard]] size_t cells() const { return cells_.size(); }
   [[nodiscard]] std::string_view text(size_t column) const { return cells_.at(column); }

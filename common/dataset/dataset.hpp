@@ -36,7 +36,7 @@ class PictureSource {
 };
 
 struct PictureOptions {
-  double fps = 0;       // for folders and videos without times, 0 = the video's own or 30
+  double fps = 0;       // of folders and videos; 0 = the video's own times, 30 for a folder
   bool colour = false;  // also fill Picture::colour, for people to look at
 };
 

@@ -118,6 +118,7 @@ Result<std::vector<fs::path>> pictures_in(const fs::path& folder) {
 }
 
 MaybeSource open_folder(const fs::path& folder, const PictureOptions& options) {
+  constexpr double kDefaultFps = 30;
   const double fps = options.fps > 0 ? options.fps : kDefaultFps;
   const auto files = pictures_in(folder);
   if (!files.ok()) return files.error();

@@ -8,9 +8,8 @@ namespace railfix::dataset {
 using MaybePicture = core::Result<std::optional<Picture>>;
 using MaybeSource = core::Result<std::unique_ptr<PictureSource>>;
 
-/// Of folders, and of videos that do not say their rate.
-constexpr double kDefaultFps = 30.0;
-
+/// Stamps are the film's own times since its first picture; a frame whose time is missing or not behind the one before
+/// is a broken picture. Where PictureOptions::fps is given, they are frame number / fps whatever the film says.
 MaybeSource open_video(const std::filesystem::path& file, const PictureOptions& options);
 
 }  // namespace railfix::dataset

@@ -4,6 +4,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/yaml_left_out.hpp"
+
 namespace railfix::dataset {
 
 using core::Error;
@@ -21,6 +23,8 @@ Result<YamlFile> YamlFile::load(const std::filesystem::path& file) {
   yaml.file_ = file;
   try {
     yaml.root_ = YAML::Load(content.str());
+    if (const auto whole = core::check_nothing_left_out(content.str(), file.string()); !whole.ok())
+      return whole.error();
   } catch (const YAML::Exception& problem) {
     return Error{file.string() + " line " + std::to_string(problem.mark.line + 1) + ": is not YAML: " + problem.msg};
   }

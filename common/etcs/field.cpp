@@ -2,13 +2,9 @@
 
 namespace railfix::etcs {
 
-namespace {
-
-core::Error spare(const Field& field, uint32_t value) {
-  return {std::string(field.name) + " = " + std::to_string(value) + " is a spare value."};
+std::string sentence(const SpareValue& spare) {
+  return std::string(spare.field) + " = " + std::to_string(spare.value) + " is a spare value.";
 }
-
-}  // namespace
 
 void FieldReader::field(const Field& field, uint32_t& value) {
   if (!status_.ok()) return;
@@ -19,7 +15,12 @@ void FieldReader::field(const Field& field, uint32_t& value) {
     return;
   }
   value = bits_.read(field.bits);
-  if (!field.meaningful(value)) status_ = spare(field, value);
+  if (field.meaningful(value)) return;
+  if (spare_ != nullptr) {
+    spare_->push_back({field.name, value});
+  } else {
+    status_ = core::Error{sentence({field.name, value})};
+  }
 }
 
 void FieldReader::field_if(bool present, const char* /*when*/, const Field& field, std::optional<uint32_t>& value) {
@@ -33,7 +34,7 @@ void FieldWriter::field(const Field& field, uint32_t value) {
     status_ = core::Error{std::string(field.name) + " = " + std::to_string(value) +
                           " does not fit: its range is 0 to " + std::to_string(field.limit()) + "."};
   } else if (!field.meaningful(value)) {
-    status_ = spare(field, value);
+    status_ = core::Error{sentence({field.name, value})};
   } else {
     bits_.write(value, field.bits);
   }

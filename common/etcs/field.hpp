@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/result.hpp"
 #include "etcs/bits.hpp"
@@ -31,16 +32,25 @@ constexpr Field full_field(const char* name, unsigned bits) {
   return field;
 }
 
-/// The first error stays; fields after it are skipped.
+/// A value that the standard gives no meaning.
+struct SpareValue {
+  const char* field;
+  uint32_t value;
+};
+/// "FIELD = VALUE is a spare value."
+std::string sentence(const SpareValue& spare);
+
+/// The first error stays; fields after it are skipped. Spare values are errors, unless they are to be listed.
 class FieldReader {
  public:
-  explicit FieldReader(BitReader& bits) : bits_(bits) {}
+  explicit FieldReader(BitReader& bits, std::vector<SpareValue>* spare = nullptr) : bits_(bits), spare_(spare) {}
   void field(const Field& field, uint32_t& value);
   void field_if(bool present, const char* when, const Field& field, std::optional<uint32_t>& value);
   [[nodiscard]] const core::Status& status() const { return status_; }
 
  private:
   BitReader& bits_;
+  std::vector<SpareValue>* spare_;
   core::Status status_;
 };
 

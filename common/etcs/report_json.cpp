@@ -174,11 +174,10 @@ void read_locations(const Json& json, JsonReader& reader, std::vector<ReportLoca
 }  // namespace
 
 nlohmann::ordered_json to_json(const TrainPositionReport& report, Baseline baseline) {
-  const auto message = core::value_or_throw(encode(report, baseline));
   Json json;
   JsonWriter writer(json);
   writer.field(kNidMessage, kNidMessagePositionReport);
-  writer.field(kLMessage, static_cast<uint32_t>(message.size()));
+  writer.field(kLMessage, static_cast<uint32_t>(message_bytes(report, baseline)));
   visit_header(report, writer);
   writer.field(kNidPacket, report.nid_packet);
   writer.field(kLPacket, position_packet_bits(report, baseline));

@@ -11,7 +11,7 @@
 namespace railfix::etcs {
 
 /// NID_C and NID_BG stand beside NID_LRBG; packets 4, 5 and 44 are listed under "packets" with their bits as text.
-/// REQUIRES: encode() accepts the report.
+/// REQUIRES: encode() accepts the report, or would but for spare values.
 nlohmann::ordered_json to_json(const TrainPositionReport& report, Baseline baseline);
 
 /// The other way. NID_MESSAGE, L_MESSAGE and L_PACKET may be left out, but must be right when given; NID_C with NID_BG

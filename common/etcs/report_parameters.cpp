@@ -11,33 +11,9 @@ namespace {
 constexpr uint32_t kBaseBits = 56;
 constexpr uint32_t kLocationBits = 16;
 
-}  // namespace
-
-uint32_t packet_bits(const ReportParameters& parameters) {
-  return kBaseBits + static_cast<uint32_t>(parameters.locations.size()) * kLocationBits;
-}
-
-core::Result<std::vector<uint8_t>> encode(const ReportParameters& parameters) {
-  if (parameters.locations.size() > kNIter.limit()) {
-    return core::Error{"Packet 58 holds at most 31 locations, not " + std::to_string(parameters.locations.size()) +
-                       "."};
-  }
-  const auto count = static_cast<uint32_t>(parameters.locations.size());
-  BitWriter bits;
-  FieldWriter writer(bits);
-  writer.field(kNidPacket, kNidPacketReportParameters);
-  writer.field(kQDir, parameters.q_dir);
-  writer.field(kLPacket, packet_bits(parameters));
-  visit_cycles(parameters, writer);
-  writer.field(kNIter, count);
-  for (const auto& location : parameters.locations) visit_location(location, writer);
-  if (!writer.status().ok()) return writer.status().error();
-  return bits.bytes();
-}
-
-core::Result<ReportParameters> decode_report_parameters(std::span<const uint8_t> packet) {
+core::Result<ReportParameters> read_packet(std::span<const uint8_t> packet, std::vector<SpareValue>* spare) {
   BitReader bits(packet);
-  FieldReader reader(bits);
+  FieldReader reader(bits, spare);
   ReportParameters parameters;
   uint32_t nid_packet = 0;
   uint32_t l_packet = 0;
@@ -64,6 +40,40 @@ core::Result<ReportParameters> decode_report_parameters(std::span<const uint8_t>
   }
   if (const auto status = read_padding(bits); !status.ok()) return status.error();
   return parameters;
+}
+
+}  // namespace
+
+uint32_t packet_bits(const ReportParameters& parameters) {
+  return kBaseBits + static_cast<uint32_t>(parameters.locations.size()) * kLocationBits;
+}
+
+core::Result<std::vector<uint8_t>> encode(const ReportParameters& parameters) {
+  if (parameters.locations.size() > kNIter.limit()) {
+    return core::Error{"Packet 58 holds at most 31 locations, not " + std::to_string(parameters.locations.size()) +
+                       "."};
+  }
+  const auto count = static_cast<uint32_t>(parameters.locations.size());
+  BitWriter bits;
+  FieldWriter writer(bits);
+  writer.field(kNidPacket, kNidPacketReportParameters);
+  writer.field(kQDir, parameters.q_dir);
+  writer.field(kLPacket, packet_bits(parameters));
+  visit_cycles(parameters, writer);
+  writer.field(kNIter, count);
+  for (const auto& location : parameters.locations) visit_location(location, writer);
+  if (!writer.status().ok()) return writer.status().error();
+  return bits.bytes();
+}
+
+core::Result<ReportParameters> decode_report_parameters(std::span<const uint8_t> packet) {
+  return read_packet(packet, nullptr);
+}
+
+core::Result<ReportParameters> decode_report_parameters_with_spare(std::span<const uint8_t> packet,
+                                                                   std::vector<SpareValue>& spare) {
+  spare.clear();
+  return read_packet(packet, &spare);
 }
 
 }  // namespace railfix::etcs

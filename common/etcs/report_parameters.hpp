@@ -37,5 +37,8 @@ uint32_t packet_bits(const ReportParameters& parameters);
 /// The packet alone, padded with zeros to whole bytes.
 core::Result<std::vector<uint8_t>> encode(const ReportParameters& parameters);
 core::Result<ReportParameters> decode_report_parameters(std::span<const uint8_t> packet);
+/// That takes spare values, too, and lists them.
+core::Result<ReportParameters> decode_report_parameters_with_spare(std::span<const uint8_t> packet,
+                                                                   std::vector<SpareValue>& spare);
 
 }  // namespace railfix::etcs

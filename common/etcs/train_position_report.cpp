@@ -92,7 +92,7 @@ core::Status read_other_packet(BitReader& bits, std::vector<OtherPacket>& packet
 
 /// NID_MESSAGE, L_MESSAGE, T_TRAIN, NID_ENGINE.
 core::Status read_header(BitReader& bits, size_t message_bytes, TrainPositionReport& report) {
-  FieldReader reader(bits);
+  FieldReader reader(bits);  // none of its values is spare
   uint32_t nid_message = 0;
   uint32_t l_message = 0;
   reader.field(kNidMessage, nid_message);
@@ -108,8 +108,9 @@ core::Status read_header(BitReader& bits, size_t message_bytes, TrainPositionRep
   return reader.status();
 }
 
-core::Status read_position(BitReader& bits, Baseline baseline, TrainPositionReport& report) {
-  FieldReader reader(bits);
+core::Status read_position(BitReader& bits, Baseline baseline, std::vector<SpareValue>* spare,
+                           TrainPositionReport& report) {
+  FieldReader reader(bits, spare);
   uint32_t l_packet = 0;
   reader.field(kNidPacket, report.nid_packet);
   if (!reader.status().ok()) return reader.status();
@@ -122,6 +123,20 @@ core::Status read_position(BitReader& bits, Baseline baseline, TrainPositionRepo
   return core::Error{"L_PACKET of packet " + number(report.nid_packet) + " is " + number(l_packet) +
                      " bits, but with these fields it must be " + number(expected) + " in Baseline " +
                      number(static_cast<size_t>(baseline)) + "."};
+}
+
+core::Result<TrainPositionReport> read_message(std::span<const uint8_t> message, Baseline baseline,
+                                               std::vector<SpareValue>* spare) {
+  if (message.empty()) return core::Error{"The message is empty."};
+  BitReader bits(message);
+  TrainPositionReport report;
+  if (const auto status = read_header(bits, message.size(), report); !status.ok()) return status.error();
+  if (const auto status = read_position(bits, baseline, spare, report); !status.ok()) return status.error();
+  while (bits.left() >= 8) {
+    if (const auto status = read_other_packet(bits, report.other_packets); !status.ok()) return status.error();
+  }
+  if (const auto status = read_padding(bits); !status.ok()) return status.error();
+  return report;
 }
 
 }  // namespace
@@ -154,17 +169,24 @@ core::Result<std::vector<uint8_t>> encode(const TrainPositionReport& report, Bas
   return bits.bytes();
 }
 
+size_t message_bytes(const TrainPositionReport& report, Baseline baseline) {
+  BitCounter header;
+  header.field(kNidMessage, 0);
+  header.field(kLMessage, 0);
+  visit_header(report, header);
+  size_t bits = header.bits() + position_packet_bits(report, baseline);
+  for (const auto& packet : report.other_packets) bits += kPacketHeadBits + packet.content.size();
+  return (bits + 7) / 8;
+}
+
 core::Result<TrainPositionReport> decode(std::span<const uint8_t> message, Baseline baseline) {
-  if (message.empty()) return core::Error{"The message is empty."};
-  BitReader bits(message);
-  TrainPositionReport report;
-  if (const auto status = read_header(bits, message.size(), report); !status.ok()) return status.error();
-  if (const auto status = read_position(bits, baseline, report); !status.ok()) return status.error();
-  while (bits.left() >= 8) {
-    if (const auto status = read_other_packet(bits, report.other_packets); !status.ok()) return status.error();
-  }
-  if (const auto status = read_padding(bits); !status.ok()) return status.error();
-  return report;
+  return read_message(message, baseline, nullptr);
+}
+
+core::Result<TrainPositionReport> decode_with_spare(std::span<const uint8_t> message, Baseline baseline,
+                                                    std::vector<SpareValue>& spare) {
+  spare.clear();
+  return read_message(message, baseline, &spare);
 }
 
 core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> message, Baseline baseline,

@@ -68,6 +68,10 @@ core::Result<std::vector<uint8_t>> encode(const TrainPositionReport& report, Bas
 /// wrong.
 core::Result<TrainPositionReport> decode(std::span<const uint8_t> message, Baseline baseline);
 
+/// decode() that takes spare values, too, and lists them: nothing else can be done with such a report but to print it.
+core::Result<TrainPositionReport> decode_with_spare(std::span<const uint8_t> message, Baseline baseline,
+                                                    std::vector<SpareValue>& spare);
+
 /// decode(); where it refuses a message of the other baseline, the sentence ends with "It reads well as `option` 4.",
 /// or 3.
 core::Result<TrainPositionReport> decode_or_advise(std::span<const uint8_t> message, Baseline baseline,
@@ -91,6 +95,9 @@ std::string said_of_no_group(const TrainPositionReport& report);
 
 /// L_PACKET of packet 0 or 1 of this report in bits. REQUIRES: encode() accepts the report.
 uint32_t position_packet_bits(const TrainPositionReport& report, Baseline baseline);
+
+/// L_MESSAGE in bytes, spare values or not.
+size_t message_bytes(const TrainPositionReport& report, Baseline baseline);
 
 /// Metres per step of a distance, by Q_SCALE (0 to 2).
 double scale_m(uint32_t q_scale);

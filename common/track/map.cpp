@@ -58,6 +58,37 @@ const Edge* piece_at(const Map& map, const Edge& first, double& offset_m) {
   return piece;
 }
 
+constexpr std::string_view kByNumber = "edge/";
+
+/// Nullptr where the text is no number, or of no edge.
+const Edge* edge_numbered(const Map& map, std::string_view text) {
+  if (text.starts_with(kByNumber)) text.remove_prefix(kByNumber.size());
+  uint32_t id = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
+  return error == std::errc() && end == text.data() + text.size() ? map.edge(id) : nullptr;
+}
+
+core::Result<const Edge*> edge_meant(const Map& map, std::string_view text) {
+  const Edge* const numbered = edge_numbered(map, text);
+  if (numbered != nullptr && text.starts_with(kByNumber)) return numbered;
+  std::vector<const Edge*> meant;
+  for (const Edge& edge : map.edges) {
+    if (&edge == numbered || edge.name == text) meant.push_back(&edge);
+  }
+  const std::string said = "\"" + std::string(text) + "\"";
+  if (meant.empty()) return core::Error{"the map has no edge " + said + "; `railfix map info` lists its edges"};
+  if (meant.size() == 1) return meant.front();
+  std::vector<std::string> ways;
+  for (const Edge* edge : meant) {
+    constexpr size_t kMostNamed = 8;
+    if (ways.size() < kMostNamed) ways.push_back(std::string(kByNumber) + std::to_string(edge->id));
+  }
+  return core::Error{said +
+                     (numbered != nullptr ? " is the number of one edge and the name of another"
+                                          : " is the name of " + std::to_string(meant.size()) + " edges") +
+                     "; write one of " + core::joined(ways) + " instead"};
+}
+
 }  // namespace
 
 std::string to_string(LandmarkKind kind) {
@@ -126,16 +157,10 @@ core::Result<EdgePosition> Map::parse_position(const std::string& text) const {
   out.offset_m = *offset;
 
   const std::string_view wanted = rest.substr(0, colon);
-  const auto named = std::find_if(edges.begin(), edges.end(), [&](const Edge& e) { return e.name == wanted; });
-  const Edge* found = named != edges.end() ? &*named : nullptr;
-  uint32_t id = 0;
-  const auto [end, error] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), id);
-  const bool is_number = error == std::errc() && end == wanted.data() + wanted.size() && edge(id) != nullptr;
-  if (is_number) found = edge(id);
-  if (found == nullptr) {
-    return core::Error{"the map has no edge \"" + std::string(wanted) + "\"; `railfix map info` lists its edges"};
-  }
-  if (!is_number) found = piece_at(*this, *found, out.offset_m);
+  const core::Result<const Edge*> meant = edge_meant(*this, wanted);
+  if (!meant.ok()) return meant.error();
+  const Edge* found = meant.value();
+  if (edge_numbered(*this, wanted) == nullptr) found = piece_at(*this, *found, out.offset_m);
   out.edge = found->id;
   constexpr double kWrittenM = 1e-3;  // `railfix map info` writes lengths so finely
   if (out.offset_m < 0 || out.offset_m > found->alignment.length_m() + kWrittenM) {
@@ -145,6 +170,12 @@ core::Result<EdgePosition> Map::parse_position(const std::string& text) const {
   }
   out.offset_m = std::min(out.offset_m, found->alignment.length_m());
   return out;
+}
+
+std::string Map::edge_text(uint32_t id) const {
+  const std::string number = std::to_string(id);
+  const bool is_name = std::ranges::any_of(edges, [&](const Edge& e) { return e.id != id && e.name == number; });
+  return (is_name ? std::string(kByNumber) : "") + number;
 }
 
 std::vector<const Landmark*> Map::landmarks_on(uint32_t edge_id) const {

@@ -126,15 +126,18 @@ class Map {
   std::vector<Landmark> landmarks;  // landmarks[i].id == i + 1
   std::vector<BaliseGroup> balise_groups;
   std::vector<std::string> problems;
-  double q_locacc_m = 0;  // of virtual groups: how far off its places may be, 0 = not known
+  double q_locacc_m = 0;                 // of virtual groups: how far off its places may be, 0 = not known
   std::vector<std::string> learnt_runs;  // whose sightings are in its landmarks (`railfix map learn`), by their content
 
   /// Nullptr when there is no such edge or landmark.
   [[nodiscard]] const Edge* edge(uint32_t id) const;
   [[nodiscard]] const Landmark* landmark(uint32_t id) const;
-  /// "EDGE:OFFSET[:+|-]", EDGE a number or a name. Behind a name the offset may run on over the line's next pieces,
+  /// "EDGE:OFFSET[:+|-]", EDGE a name, a number N or edge/N, which is never a name. What several edges are meant by is
+  /// an error. Behind a name the offset may run on over the line's next pieces,
   /// which are called NAME#2, NAME#3, ... where switches cut it, as far as each begins where the last one ends.
   [[nodiscard]] core::Result<EdgePosition> parse_position(const std::string& text) const;
+  /// The edge's number as parse_position() takes it: edge/N where another edge is called N.
+  [[nodiscard]] std::string edge_text(uint32_t id) const;
   /// Landmarks of one edge, by offset. Looked up in a map as it was loaded, not in a copy or after landmarks came or
   /// went: there all are gone through. REQUIRES: no landmark of a loaded map was put onto another edge.
   [[nodiscard]] std::vector<const Landmark*> landmarks_on(uint32_t edge) const;

@@ -146,18 +146,24 @@ class Pipeline final : public VideoStream {
     auto mapped = std::make_shared<MappedSample>(sample);
     rate_hz_ = mapped->rate_hz();
     const cv::Mat pixels = mapped->pixels();
-    return {pixels, std::move(mapped), age_ns(*sample)};
+    const auto at_ns = shown_at_ns(*sample);
+    return {pixels, std::move(mapped), at_ns ? age_ns(*at_ns) : 0, at_ns};
   }
-  /// Now less the time that the source has given the picture, both on the pipeline's clock.
-  [[nodiscard]] int64_t age_ns(GstSample& sample) const {
-    const Clock clock(gst_element_get_clock(pipeline_.get()));
+  /// Since the pipeline runs.
+  [[nodiscard]] static std::optional<int64_t> shown_at_ns(GstSample& sample) {
     const GstClockTime stamp = GST_BUFFER_PTS(gst_sample_get_buffer(&sample));
     const GstSegment* const segment = gst_sample_get_segment(&sample);
-    if (!clock || !GST_CLOCK_TIME_IS_VALID(stamp) || segment->format != GST_FORMAT_TIME) return 0;
-    const GstClockTime taken = gst_segment_to_running_time(segment, GST_FORMAT_TIME, stamp);
-    if (!GST_CLOCK_TIME_IS_VALID(taken)) return 0;
+    if (!GST_CLOCK_TIME_IS_VALID(stamp) || segment->format != GST_FORMAT_TIME) return std::nullopt;
+    const GstClockTime shown = gst_segment_to_running_time(segment, GST_FORMAT_TIME, stamp);
+    if (!GST_CLOCK_TIME_IS_VALID(shown)) return std::nullopt;
+    return static_cast<int64_t>(shown);
+  }
+  /// Now less the time that the source has given the picture, both on the pipeline's clock.
+  [[nodiscard]] int64_t age_ns(int64_t shown_at_ns) const {
+    const Clock clock(gst_element_get_clock(pipeline_.get()));
+    if (!clock) return 0;
     const GstClockTime now = gst_clock_get_time(clock.get()) - gst_element_get_base_time(pipeline_.get());
-    return std::max<int64_t>(0, GST_CLOCK_DIFF(taken, now));
+    return std::max<int64_t>(0, static_cast<int64_t>(now) - shown_at_ns);
   }
   /// What the elements have said: the first error counts, the rest follow from it.
   void listen(milliseconds patience) {

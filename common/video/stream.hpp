@@ -15,7 +15,8 @@ struct Frame {
   cv::Mat pixels;  // CV_8UC1, or CV_8UC3 (blue, green, red) where colours are asked for; to be read only, while `keep`
                    // is kept
   std::shared_ptr<const void> keep;
-  int64_t age_ns = 0;  // since the source has stamped it; 0 where the source has no clock
+  int64_t age_ns = 0;                 // since the source has stamped it; 0 where the source has no clock
+  std::optional<int64_t> at_ns = {};  // when the film or the pipeline shows it; nothing where it does not say
 };
 
 /// What is asked of a device; 0 = the most that it has, up to `most_*`.

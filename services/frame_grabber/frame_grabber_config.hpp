@@ -43,7 +43,8 @@ struct FrameGrabberConfig {
                 "(or address, or any), capture:DEVICE, PIPELINE or URL.");
     fields.text("calibration", calibration, "Calibration file; empty = the one that lies with the pictures.");
     fields.number("fps", fps, {0, 1000}, "1/s",
-                  "Rate of a folder of pictures, a video or a live camera; 0 = its own, 30 for a folder.");
+                  "Rate of a folder of pictures, a video or a live camera; 0 = its own (of a video the times of its "
+                  "pictures), 30 for a folder.");
     fields.choice(
         "pace", pace, {"real", "lossless"},
         "real: at the recorded rate, late pictures are skipped; lossless: the next picture when all in wait_for "

@@ -49,11 +49,13 @@ int build(const BuildRequest& request) {
     if (built.plans.elements > 0) json["plans"] = to_json(built.plans);
     if (built.osm.elements > 0) json["osm"] = to_json(built.osm);
     if (built.virtual_balises.was_asked_for()) json["virtual_balises"] = to_json(built.virtual_balises);
+    if (!built.crs_remark.empty()) json["remark"] = built.crs_remark;
     json["problems"] = built.map.problems;
     print_json(json);
     return 0;
   }
   print_summary(built.map);
+  if (!built.crs_remark.empty()) std::printf("remark           %s\n", built.crs_remark.c_str());
   print_virtual_balises(built.virtual_balises);
   print_figures("LandXML, element by element", built.landxml);
   print_figures("Coordinates of a plan, arcs through the points", built.plans);

@@ -90,9 +90,10 @@ int locate(const LocateRequest& request) {
   std::printf("place            %s%s\n", certainty, to_string(location.doubt).c_str());
   for (size_t i = 0; i < std::min<size_t>(location.places.size(), 8); ++i) {
     const auto& p = location.places[i];
-    std::printf("  %6.2f %%  %u:%.0f:%c  %s, +-%.0f m, scale %.4f, misfit %.2f\n", 100 * p.probability, p.place.edge,
-                p.place.offset_m, p.place.direction == track::Direction::reverse ? '-' : '+',
-                map->edge(p.place.edge)->name.c_str(), p.sigma_m, p.scale, p.misfit);
+    std::printf("  %6.2f %%  %s:%.0f:%c  %s, +-%.0f m, scale %.4f, misfit %.2f\n", 100 * p.probability,
+                map->edge_text(p.place.edge).c_str(), p.place.offset_m,
+                p.place.direction == track::Direction::reverse ? '-' : '+', map->edge(p.place.edge)->name.c_str(),
+                p.sigma_m, p.scale, p.misfit);
   }
   return 0;
 }

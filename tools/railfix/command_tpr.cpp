@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,6 +29,7 @@ std::string format(const char* pattern, double value) {
 }
 
 std::string metres_text(uint32_t raw, uint32_t q_scale) {
+  if (q_scale > etcs::kQScale.largest) return "a distance of unknown scale";
   return format(q_scale == 0 ? "%.1f m" : "%.0f m", etcs::metres(raw, q_scale));
 }
 
@@ -80,12 +83,20 @@ std::string meaning(const std::string& name, uint32_t value, const etcs::TrainPo
   return "";
 }
 
-void print_table(const nlohmann::ordered_json& json, const etcs::TrainPositionReport& report) {
+using SpareValues = std::vector<etcs::SpareValue>;
+
+bool is_spare(const SpareValues& spare, const std::string& field) {
+  return std::ranges::any_of(spare, [&](const auto& value) { return field == value.field; });
+}
+
+void print_table(const nlohmann::ordered_json& json, const etcs::TrainPositionReport& report,
+                 const SpareValues& spare) {
   std::printf("%-12s %10s  %s\n", "field", "value", "meaning");
   for (const auto& [name, value] : json.items()) {
     if (!value.is_number_unsigned() || name == "NID_C" || name == "NID_BG") continue;
     const auto raw = value.get<uint32_t>();
-    std::printf("%-12s %10u  %s\n", name.c_str(), raw, meaning(name, raw, report).c_str());
+    const std::string said = is_spare(spare, name) ? "a spare value" : meaning(name, raw, report);
+    std::printf("%-12s %10u  %s\n", name.c_str(), raw, said.c_str());
   }
   for (const auto& packet : report.other_packets) {
     const char* what = packet.nid_packet == 4   ? "error reporting"
@@ -108,7 +119,7 @@ void remark(const etcs::TrainPositionReport& report) {
   if (!said.empty()) std::cerr << "remark: " << said << '\n';
 }
 
-void print_packet_58(const etcs::ReportParameters& packet) {
+void print_packet_58(const etcs::ReportParameters& packet, const SpareValues& spare) {
   struct Row {
     const char* name;
     uint32_t value;
@@ -131,29 +142,62 @@ void print_packet_58(const etcs::ReportParameters& packet) {
                     "when passed by the " + one_of({"min safe rear end", "max safe front end"}, location.q_lgtloc)});
   }
   std::printf("%-12s %10s  %s\n", "field", "value", "meaning");
-  for (const auto& row : rows) std::printf("%-12s %10u  %s\n", row.name, row.value, row.meaning.c_str());
+  for (const auto& row : rows) {
+    const bool means_nothing = is_spare(spare, row.name);
+    std::printf("%-12s %10u  %s\n", row.name, row.value, means_nothing ? "a spare value" : row.meaning.c_str());
+  }
+}
+
+/// All is printed before this is thrown, so that scripts, too, see that the message is not as it should be.
+void refuse_spare(const SpareValues& spare) {
+  std::string said;
+  for (const auto& value : spare) said += (said.empty() ? "" : " ") + etcs::sentence(value);
+  if (!said.empty()) throw BadInput(said);
+}
+
+void print_json(const nlohmann::ordered_json& json) {
+  std::cout << core::json_text(json, 2) << '\n';
+}
+
+void decode_packet_58(std::span<const uint8_t> bytes, bool json_wanted) {
+  SpareValues spare;
+  auto packet = etcs::decode_report_parameters_with_spare(bytes, spare);
+  if (!packet.ok()) packet = core::value_or_throw(etcs::decode_report_parameters(bytes));
+  if (json_wanted) {
+    print_json(etcs::to_json(packet.value()));
+  } else {
+    print_packet_58(packet.value(), spare);
+  }
+  refuse_spare(spare);
+}
+
+/// Spare values may come from reading a message of the other baseline.
+bool reads_as_other(std::span<const uint8_t> bytes, Baseline baseline) {
+  return etcs::decode(bytes, baseline == Baseline::b3 ? Baseline::b4 : Baseline::b3).ok();
+}
+
+void decode_message(std::span<const uint8_t> bytes, Baseline baseline, bool json_wanted) {
+  SpareValues spare;
+  auto report = etcs::decode_with_spare(bytes, baseline, spare);
+  if (!report.ok() || (!spare.empty() && reads_as_other(bytes, baseline)))
+    report = core::value_or_throw(etcs::decode_or_advise(bytes, baseline, "--baseline"));
+  const auto json = etcs::to_json(report.value(), baseline);
+  if (json_wanted) {
+    print_json(json);
+  } else {
+    print_table(json, report.value(), spare);
+  }
+  remark(report.value());
+  refuse_spare(spare);
 }
 
 int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
   const auto bytes = core::value_or_throw(etcs::parse_hex(hex));
   if (!bytes.empty() && bytes.front() == etcs::kNidPacketReportParameters) {
-    const auto packet = core::value_or_throw(etcs::decode_report_parameters(bytes));
-    if (json_wanted) {
-      std::cout << core::json_text(etcs::to_json(packet), 2) << '\n';
-    } else {
-      print_packet_58(packet);
-    }
-    return 0;
-  }
-  const auto report = etcs::decode_or_advise(bytes, baseline, "--baseline");
-  if (!report.ok()) throw BadInput(report.error().message);
-  const auto json = etcs::to_json(report.value(), baseline);
-  if (json_wanted) {
-    std::cout << core::json_text(json, 2) << '\n';
+    decode_packet_58(bytes, json_wanted);
   } else {
-    print_table(json, report.value());
+    decode_message(bytes, baseline, json_wanted);
   }
-  remark(report.value());
   return 0;
 }
 

@@ -266,6 +266,13 @@ int compare_reports(const CompareOptions& options) {
     std::printf("delivered once more      ours %zu, certified %zu reports: alike with the same stamp, counted once\n",
                 ours.repeated(), certified.repeated());
   }
+  if (ours.left_out() + certified.left_out() > 0) {
+    std::printf(
+        "no report can be read    from %zu lines of ours, %zu of the certified: the first are named above, and they "
+        "are in none of the "
+        "figures\n",
+        ours.left_out(), certified.left_out());
+  }
   if (pairing.ours.off_line + pairing.certified.off_line > 0) {
     std::printf("group not on the line    ours %zu, certified %zu reports: not paired, but \"known\" as they say\n",
                 pairing.ours.off_line, pairing.certified.off_line);

@@ -11,6 +11,7 @@ namespace railfix::tool {
 namespace {
 
 constexpr const char* kTopic = "topic:";
+constexpr size_t kMostNamed = 5;
 
 }  // namespace
 
@@ -26,7 +27,10 @@ ReportSource::ReportSource(const std::string& where, etcs::Baseline baseline, Tr
   } else if (where.ends_with(".mcap")) {
     read_recording(where);
   } else {
-    for (auto& report : core::value_or_throw(compare::read_reports(where, baseline))) add(std::move(report));
+    auto log = core::value_or_throw(compare::read_reports(where, baseline));
+    for (auto& report : log.reports) add(std::move(report));
+    left_out_ = log.lines_refused.size();
+    for (size_t i = 0; i < std::min(left_out_, kMostNamed); ++i) std::cerr << log.lines_refused[i] << '\n';
   }
 }
 
@@ -45,6 +49,7 @@ void ReportSource::take(const msg::TrainPositionReport& report) {
   const auto in_time = compare::check_stamp(report.stamp_ns());
   auto fields = etcs::decode(messaging::bytes_of(report), static_cast<etcs::Baseline>(report.baseline()));
   if (!in_time.ok() || !fields.ok()) {
+    ++left_out_;
     if (refusal_.empty()) {
       refusal_ = in_time.ok() ? fields.error().message : in_time.error().message;
       std::cerr << "a report was left out: " << refusal_ << '\n';

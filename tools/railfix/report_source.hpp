@@ -24,6 +24,8 @@ class ReportSource {
   [[nodiscard]] const std::vector<compare::TimedReport>& reports() const { return reports_; }
   /// Reports that came once more, alike with the same stamp, and count once: MQTT may deliver twice.
   [[nodiscard]] size_t repeated() const { return repeated_; }
+  /// Lines or samples that hold no report; the first of them were named on standard error.
+  [[nodiscard]] size_t left_out() const { return left_out_; }
   /// The other end's clock is put forward by this.
   void shift(int64_t offset_ns);
 
@@ -34,6 +36,7 @@ class ReportSource {
 
   std::vector<compare::TimedReport> reports_;
   size_t repeated_ = 0;
+  size_t left_out_ = 0;
   int64_t offset_ns_ = 0;
   std::string refusal_;  // why reports were left out, told once
   std::unique_ptr<TopicListener> listener_;

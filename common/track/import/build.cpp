@@ -99,10 +99,10 @@ class Sources {
         take(core::value_or_throw(read_landxml(file)), file);
         break;
       case Kind::osm:
-        take(core::value_or_throw(read_osm(file, options_.with_trams)));
+        take(core::value_or_throw(read_osm(file, options_.with_trams)), file);
         break;
       case Kind::json:
-        take(core::value_or_throw(read_osm_json(file, options_.with_trams)));
+        take(core::value_or_throw(read_osm_json(file, options_.with_trams)), file);
         break;
       case Kind::railml:
         take(core::value_or_throw(read_railml(file)), file);
@@ -186,7 +186,8 @@ class Sources {
     all.max_m = std::max(all.max_m, read.max_m);
   }
 
-  void take(OsmData read) {
+  void take(OsmData read, const std::filesystem::path& file) {
+    if (const auto middle = middle_of(read)) places_.push_back({file.filename().string(), *middle});
     osm_.nodes.merge(read.nodes);
     // GeoJSON has lines in one file and points in another.
     for (auto& [id, node] : read.nodes) {
@@ -220,6 +221,7 @@ class Sources {
                            (source_crs_.empty() ? "an unnamed one" : source_crs_) + "; build one map of each");
     }
     source_crs_ = crs;
+    if (!has_plane_source_) plane_source_ = file.filename().string();
     has_plane_source_ = true;
   }
 
@@ -232,7 +234,13 @@ class Sources {
         throw core::BadInput("the plan is in " + source_crs_ + " and is not reprojected; leave --crs " + map_.crs +
                              " out");
       }
-      if (map_.crs.empty()) map_.crs = source_crs_;
+      if (map_.crs.empty()) {
+        map_.crs = source_crs_;
+      } else if (source_crs_.empty()) {
+        out_.crs_remark = plane_source_ +
+                          " names no coordinate system: its coordinates stay as they are and are taken as " + map_.crs +
+                          "'s";
+      }
     } else if (const std::optional<GeoPoint> middle = middle_of(osm_)) {
       if (map_.crs.empty()) map_.crs = utm_crs(*middle);
       if (map_.crs == "local") map_.crs = local_crs(*middle);
@@ -271,6 +279,8 @@ class Sources {
       throw core::BadInput(lack + (cuts_.empty() ? "" : "; " + cuts_.front()));
     if (map_.crs.empty() || map_.crs == "local")
       throw core::BadInput("OpenStreetMap data need a coordinate system; give --crs");
+    if (const auto middle = middle_on_earth(map_)) places_.insert(places_.begin(), {plane_source_, *middle});
+    std::ranges::move(told_apart(places_), std::back_inserter(cuts_));
     const Projection projection = core::value_or_throw(Projection::open(map_.crs));
     auto built = build_osm_network(osm_, projection, options_.smooth_m, options_.with_clothoids);
     if (!built.ok()) {  // whereabouts_problem() says it of a map
@@ -293,7 +303,9 @@ class Sources {
   std::optional<std::filesystem::path> erju_infra_;
   std::optional<std::filesystem::path> erju_map_;
   OsmData osm_;
+  std::vector<InputPlace> places_;  // of what lies in latitude and longitude
   std::string source_crs_;
+  std::string plane_source_;  // the first one's file
   bool has_plane_source_ = false;
   std::vector<std::string> cuts_;  // of what was read: what extracts lack and ends that meet no other; told first
   BuiltMap out_;

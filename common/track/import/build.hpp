@@ -32,6 +32,7 @@ struct BuiltMap {
   FitFigures plans;  // railML and ERJU with coordinates
   FitReport fit;     // of all polylines
   VirtualBalises virtual_balises;
+  std::string crs_remark;  // what --crs was taken for, where a source does not name its system
 };
 
 /// LandXML (.xml, .landxml), railML 2 and 3 (.xml, .railml), ERJU infrastructure and map (.xml, both together), OSM

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 
 #include "core/units.hpp"
 #include "map_matcher/shape/curvature_matcher.hpp"
@@ -163,10 +165,21 @@ void run(const std::shared_ptr<const track::Path>& path, uint64_t seed, Comparis
   sums.exits_linear.fixes += static_cast<int>(exits.anchors().size() / 2);
 }
 
+/// Wherever the tool is started.
+std::string real_alignment() {
+  namespace fs = std::filesystem;
+  const char* const told = std::getenv("RAILFIX_DATA");
+  const fs::path data = told != nullptr ? fs::path(told) : fs::path(RAILFIX_SOURCE_DIR).parent_path() / "shared/data";
+  const fs::path file = data / "alignment/sbb_mszw_a2.landxml";
+  if (!fs::exists(file))
+    throw core::BadInput(file.string() + " does not exist; give --map, or its folder's place as RAILFIX_DATA");
+  return file;
+}
+
 }  // namespace
 
 int measure_curvature(const MatchingOptions& options) {
-  const std::string file = options.map.empty() ? "../shared/data/alignment/sbb_mszw_a2.landxml" : options.map;
+  const std::string file = options.map.empty() ? real_alignment() : options.map;
   const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::build_map({file}, {})).map);
   const auto longest = std::max_element(map->edges.begin(), map->edges.end(), [](const auto& a, const auto& b) {
     return a.alignment.length_m() < b.alignment.length_m();

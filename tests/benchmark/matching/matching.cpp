@@ -19,7 +19,8 @@ const std::map<std::string, Measure> kMeasures{{"switches", measure::measure_swi
 
 constexpr const char* kWhat =
     "switches: track choice over simulated passages of switches\n"
-    "curvature: wheel and gyro alone against a map, by default ../shared/data/alignment/sbb_mszw_a2.landxml\n"
+    "curvature: wheel and gyro alone against a map, by default alignment/sbb_mszw_a2.landxml of\n"
+    "  RAILFIX_DATA, else of ../shared/data beside the sources\n"
     "landmarks: which mapped landmark was sighted, with missed and false sightings and a map that is partly wrong\n"
     "locate: the place without a prior, over trips of 5 km on a map or a made-up network; the real track wanders "
     "about\n"

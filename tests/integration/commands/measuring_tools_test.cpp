@@ -33,6 +33,16 @@ TEST(MeasuringTools, SayWhatIsWrong) {
   }
 }
 
+TEST(MeasuringTools, FindTheRealAlignmentFromAnyFolder) {
+  setenv("RAILFIX_DATA", "/no/such/data", 1);
+  const auto outcome = test::run_program({"railfix-measure-matching", "curvature", "--count", "1"}, kPatienceS);
+  unsetenv("RAILFIX_DATA");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.err,
+            "railfix-measure-matching: /no/such/data/alignment/sbb_mszw_a2.landxml does not exist; give --map, or its "
+            "folder's place as RAILFIX_DATA\n");
+}
+
 TEST(MeasuringTools, RefuseNumbersThatMeanNothing) {
   const std::vector<std::vector<std::string>> wrong{
       {"railfix-measure-confidence", "--threads", "0"},

@@ -55,6 +55,21 @@ TEST_F(TprCommand, DecodesAPacket58) {
   EXPECT_THAT(often, HasSubstr("a report as often as possible"));
 }
 
+TEST_F(TprCommand, WhatStandsBesideASpareValueIsPrinted) {
+  const std::string hex = "880601D6F345402AF34000E48F68EB84D250014010CFA830";
+  const auto outcome = tpr({"decode", hex});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.err, "railfix: V_TRAIN = 125 is a spare value.\n");
+  EXPECT_THAT(outcome.out, HasSubstr("       125  a spare value\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("country/region 123, balise group 4567"));
+  EXPECT_THAT(outcome.out, HasSubstr("         3  level 2\n"));
+  EXPECT_THAT(tpr({"decode", hex, "--json"}).out, HasSubstr("\"V_TRAIN\": 125"));
+  const auto packet = tpr({"decode", "3AC0908303E82103E9"});  // Q_DIR = 3
+  EXPECT_EQ(packet.exit_code, 2);
+  EXPECT_EQ(packet.err, "railfix: Q_DIR = 3 is a spare value.\n");
+  EXPECT_THAT(packet.out, HasSubstr("500 m from the LRBG"));
+}
+
 TEST_F(TprCommand, TheLargestDistanceOfAPacket58IsADistance) {
   const auto outcome = tpr({"decode", "3A80917FFFFF21FFFF"});
   EXPECT_THAT(outcome.out, HasSubstr("not cyclic"));

@@ -102,6 +102,11 @@ TEST(TprCompare, SaysWhatIsShownAndWhatIsNot) {
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", certified}, kPatienceS);
   EXPECT_THAT(outcome.out, HasSubstr("interval known           ours 20.0 %, certified 100.0 % of 350"));
   EXPECT_THAT(outcome.out, HasSubstr("verdict                  WORSE"));
+  std::ofstream(certified, std::ios::app) << "5,88\n7\n";
+  outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", certified}, kPatienceS);
+  EXPECT_THAT(outcome.out, HasSubstr("no report can be read    from 0 lines of ours, 2 of the certified"));
+  EXPECT_THAT(outcome.err, HasSubstr(certified + " line 352: "));
+  EXPECT_THAT(outcome.err, HasSubstr(certified + " line 353: has 1 values"));
   outcome = test::run_program({"railfix", "tpr", "compare", "--ours", ours, "--certified", "/no/such.csv"}, kPatienceS);
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("/no/such.csv"));

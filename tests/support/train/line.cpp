@@ -147,7 +147,7 @@ class Layer {
 
 }  // namespace
 
-RandomLine random_line(core::Random& random, double length_m, double switch_spacing_m) {
+RandomLine random_line(core::Random& random, double length_m, double switch_spacing_m, double first_switch_m) {
   const auto elements = random_elements(random, length_m);
   std::vector<track::GradePoint> profile;
   double elevation_m = 400;
@@ -156,7 +156,7 @@ RandomLine random_line(core::Random& random, double length_m, double switch_spac
     elevation_m += kProfileM * random.uniform(-0.015, 0.015);
   }
   Layer layer(random, {1000, 2000, random.uniform(0, 6)}, std::move(profile));
-  double next_m = switch_spacing_m * 0.5;
+  double next_m = std::max(switch_spacing_m * 0.5, first_switch_m);
   for (const auto& element : elements) {
     // Points lie in straights.
     const bool straight = element.curvature_start_per_m == 0 && element.curvature_end_per_m == 0;

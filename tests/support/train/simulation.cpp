@@ -23,6 +23,8 @@ constexpr double kShapeM = 500;        // a curve and the next err by themselves
 constexpr double kCameraTripChange = 2e-4;
 constexpr double kWheelTripChange = 5e-5;
 
+constexpr double kFirstSwitchBehindM = 100;  // the train begins on the way's first edge
+
 Drive drive_on(uint64_t seed, const SimulationPlan& plan, double most_m) {
   auto random = stream(seed, 2);
   return Drive(random, plan.duration_s, plan.max_speed_mps, most_m, plan.style);
@@ -31,7 +33,8 @@ Drive drive_on(uint64_t seed, const SimulationPlan& plan, double most_m) {
 RandomLine line_of(uint64_t seed, const SimulationPlan& plan) {
   auto random = stream(seed, 1);
   const double way_m = (plan.max_speed_mps + 3) * plan.duration_s + plan.start_wrong_m;
-  auto line = random_line(random, TrainSimulation::kStartOffsetM + way_m + 1000, plan.switch_spacing_m);
+  auto line = random_line(random, TrainSimulation::kStartOffsetM + way_m + 1000, plan.switch_spacing_m,
+                          TrainSimulation::kStartOffsetM + kFirstSwitchBehindM);
   auto things = stream(seed, 19);
   if (plan.sightings) furnish(line, things);
   return line;

@@ -36,6 +36,17 @@ TEST_F(CalibrationTest, ReadsAnEurocFile) {
   EXPECT_FALSE(read.value().mount.has_value());
 }
 
+TEST_F(CalibrationTest, WhatTheParserWouldLeaveOutIsRefused) {
+  const auto refusal = [this](const std::string& more) {
+    const auto read = read_calibration(write("sensor.yaml", kEuroc + more));
+    return read.ok() ? "" : read.error().message;
+  };
+  EXPECT_EQ(refusal("rate_hz: 60\n"),
+            (root_ / "sensor.yaml").string() + ": rate_hz is given twice, lines 8 and 14; remove one");
+  EXPECT_THAT(refusal("mount:\n  height_m: 2\n  height_m: 3\n"), HasSubstr("mount.height_m is given twice"));
+  EXPECT_THAT(refusal("---\nrate_hz: 60\n"), HasSubstr("a second document begins in line 14"));
+}
+
 TEST_F(CalibrationTest, WhatIsWrittenReadsBackTheSame) {
   CameraCalibration written;
   written.intrinsics = {1234.5, 1233.25, 639.5, 511.5, -0.1, 0.01, 1e-4, -2e-5, 1280, 1024};

@@ -3,11 +3,13 @@
 #include <opencv2/videoio.hpp>
 
 #include "dataset/dataset.hpp"
+#include "support/film_file.hpp"
 #include "temporary_folder.hpp"
 
 namespace railfix::dataset {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -115,6 +117,70 @@ TEST_F(PicturesTest, VideoAtItsOwnRateOrTheGivenOne) {
   auto faster = core::value_or_throw(open_pictures(file, {50.0}));
   (void)faster->next();
   EXPECT_EQ(faster->next().value()->stamp_ns, 20'000'000);
+}
+
+class FilmTest : public PicturesTest {
+ protected:
+  static void SetUpTestSuite() { setenv("GST_PLUGIN_FEATURE_RANK", "avdec_h264:NONE", 1); }  // the image has no FFmpeg
+
+  /// Milliseconds at the rate that the film claims, 25 /s or another.
+  [[nodiscard]] std::string film(const std::string& encoder, const std::vector<int64_t>& times_ms,
+                                 const std::string& rate = "25/1") const {
+    std::vector<int64_t> times_ns;
+    for (const int64_t time_ms : times_ms) times_ns.push_back(time_ms * 1'000'000);
+    railfix::testing::write_film(root_ / "film", encoder, rate, times_ns);
+    return root_ / "film";
+  }
+  /// "number:stamp in microseconds" of every picture, or the error.
+  static std::vector<std::string> times(const std::string& file, const PictureOptions& options = {}) {
+    auto opened = open_pictures(file, options);
+    if (!opened.ok()) return {opened.error().message};
+    std::vector<std::string> seen;
+    while (true) {
+      const auto before_ns = opened.value()->next_stamp_ns();
+      const auto next = opened.value()->next();
+      if (!next.ok()) {
+        seen.push_back(next.error().message);
+        continue;
+      }
+      if (!next.value()) return seen;
+      EXPECT_EQ(before_ns, next.value()->stamp_ns);
+      seen.push_back(next.value()->name + ":" + std::to_string(next.value()->stamp_ns / 1000));
+    }
+  }
+};
+
+TEST_F(FilmTest, VaryingRateAndLostFramesKeepTheFilmsTimes) {
+  for (const char* container : {"mp4mux", "matroskamux", "mpegtsmux"}) {
+    const auto file = film(std::string("openh264enc ! h264parse ! ") + container, {0, 40, 80, 200, 240, 510});
+    EXPECT_THAT(times(file), ElementsAre("0:0", "1:40000", "2:80000", "3:200000", "4:240000", "5:510000")) << container;
+  }
+  EXPECT_THAT(times(root_ / "film", {10.0}),
+              ElementsAre("0:0", "1:100000", "2:200000", "3:300000", "4:400000", "5:500000"))
+      << "a rate that is given goes before the film's";
+}
+
+TEST_F(FilmTest, RoundedTimesAreThoseOfTheRate) {
+  const auto file = film("jpegenc ! matroskamux", {0, 33, 67, 200, 233}, "30/1");
+  EXPECT_THAT(times(file), ElementsAre("0:0", "1:33333", "2:66666", "3:200000", "4:233333"));
+}
+
+TEST_F(FilmTest, FirstPictureIsTheBeginning) {
+  EXPECT_THAT(times(film("jpegenc ! matroskamux", {80, 120, 200})), ElementsAre("0:0", "1:40000", "2:120000"));
+}
+
+TEST_F(FilmTest, FrameThatIsNotBehindTheOneBeforeIsBroken) {
+  const auto file = film("jpegenc ! matroskamux", {0, 40, 80, 80, 120});
+  EXPECT_THAT(times(file), ElementsAre("0:0", "1:40000", "2:80000",
+                                       file + " frame 3 is at 0.080 s in the film, not behind the frame before it at "
+                                              "0.080 s; it is left out",
+                                       "4:120000"));
+}
+
+TEST_F(FilmTest, WithoutTimesAndRateItMustBeGiven) {
+  const auto file = film("openh264enc ! h264parse ! video/x-h264,stream-format=byte-stream", {0, 40, 80});
+  EXPECT_THAT(times(file), ElementsAre(AllOf(HasSubstr(file), HasSubstr("give the rate (fps)"))));
+  EXPECT_THAT(times(file, {20.0}), ElementsAre("0:0", "1:50000", "2:100000"));
 }
 
 TEST_F(PicturesTest, WhatCannotBeOpenedIsASentence) {

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
@@ -53,14 +55,63 @@ TEST(Drawing, PngHasInkOnTheTrackAndNotBesideIt) {
 TEST(Drawing, AFrogIsSeenFromNearBy) {
   track::Map map = track::small_map();
   map.landmarks = {{1, track::LandmarkKind::frog, 1, 500, 0, 0.1, ""}};
-  const auto dots_of = [&](double radius_m) {
-    return draw_map(map, {.width_px = 800, .around = track::EdgePosition{1, 500}, .radius_m = radius_m}).dots.size();
+  const auto dots_of = [&](double radius_m, double width_px) {
+    const auto at = track::EdgePosition{1, 500};
+    return draw_map(map, {.width_px = width_px, .around = at, .radius_m = radius_m}).dots.size();
   };
-  const size_t near = dots_of(100);
-  const size_t far = dots_of(5000);
+  const size_t near = dots_of(100, 800);
+  const size_t far = dots_of(5000, 400);
   map.landmarks.clear();
-  EXPECT_EQ(near, dots_of(100) + 1);
-  EXPECT_EQ(far, dots_of(5000));
+  EXPECT_EQ(near, dots_of(100, 800) + 1);
+  EXPECT_EQ(far, dots_of(5000, 400));
+}
+
+/// Of all that is drawn.
+Eigen::AlignedBox2d extent(const Drawing& drawing, size_t lines) {
+  Eigen::AlignedBox2d box;
+  for (size_t i = 0; i < lines; ++i) {
+    for (const auto& point : drawing.lines.at(i).points) box.extend(point);
+  }
+  return box;
+}
+
+TEST(Drawing, TheWindowReachesNoFurtherThanTheMap) {
+  const track::Map map = track::small_map();
+  const auto drawing = draw_map(map, {.width_px = 800, .around = track::EdgePosition{1, 500}, .radius_m = 100'000});
+  EXPECT_GT(extent(drawing, 3).sizes().x(), 0.4 * 800);
+}
+
+TEST(Drawing, TheLegendIsWithinNarrowPicturesToo) {
+  for (const double width_px : {200.0, 400.0, 1600.0}) {
+    const auto drawing = draw_map(track::small_map(), {.width_px = width_px});
+    const auto last = std::ranges::find(drawing.labels, "level crossing", &Drawing::Label::text);
+    ASSERT_NE(last, drawing.labels.end());
+    for (const auto& label : drawing.labels) EXPECT_LT(label.at.y(), drawing.height) << width_px << label.text;
+    EXPECT_LT(last->at.x() + 90, width_px);
+  }
+}
+
+TEST(Drawing, FromNearByATrackHasItsNameAndTheScaleALength) {
+  track::Map map = track::small_map();
+  const auto& edge = map.edges.front();
+  const auto drawing = draw_map(map, {.width_px = 1600, .around = track::EdgePosition{1, 100}, .radius_m = 1});
+  const auto texts = [&](const std::string& text) {
+    return std::ranges::count(drawing.labels, text, &Drawing::Label::text);
+  };
+  EXPECT_EQ(texts(edge.line.empty() ? edge.name : edge.line), 1);
+  EXPECT_EQ(texts("0.2 m"), 1);
+  EXPECT_EQ(texts("0 m"), 0);
+  for (const auto& line : drawing.lines) {
+    for (const auto& point : line.points)
+      EXPECT_LT(point.cwiseAbs().maxCoeff(), 1e6) << "pictures have no further ones";
+  }
+}
+
+TEST(Drawing, FromFarAwayMarksDoNotHideTheTracks) {
+  track::Map map = track::small_map();
+  map.edges.front().alignment = track::Alignment::chained({0, 0, 1}, {{300'000, 0, 0}});
+  const auto drawing = draw_map(map, {});
+  for (const auto& dot : drawing.dots) EXPECT_GT(dot.at.y(), drawing.height - 60) << "of the legend";
 }
 
 TEST(Drawing, TakesThePlaceOfTheOldOneAsAWhole) {

@@ -109,6 +109,39 @@ TEST_F(BuildTest, TracksThatWouldLieInTheSystemTheOtherWayRoundAreTold) {
     EXPECT_THAT(problems("[15.6,48.2],[15.6,48.21]", crs), testing::Not(testing::Contains(HasSubstr("swapped"))));
 }
 
+// The other inputs can tell, too.
+TEST_F(BuildTest, InputsThatLieApartAreTold) {
+  const auto problems = [&](const std::string& first, const std::string& second) {
+    return core::value_or_throw(
+               build_map({write("a.geojson", track_of(first)), write("b.geojson", track_of(second))}, {.crs = "local"}))
+        .map.problems;
+  };
+  const auto apart = testing::Contains(HasSubstr("the tracks of b.geojson lie around "));
+  EXPECT_THAT(problems("[15.6,48.2],[15.6,48.21]", "[48.3,15.6],[48.31,15.6]"),
+              testing::Contains(testing::MatchesRegex(
+                  "the tracks of b.geojson lie around latitude 15.600, longitude 48.305, 4... km from those of "
+                  "a.geojson, and would lie 11 km from them the other way round: latitude and longitude may be swapped "
+                  "in one of the two")));
+  EXPECT_THAT(problems("[15.6,48.2],[15.6,48.21]", "[2.3,48.2],[2.3,48.21]"),
+              testing::Contains(testing::EndsWith(" km from those of a.geojson: do they belong on one map?")));
+  EXPECT_THAT(problems("[15.6,48.2],[15.6,48.21]", "[14.6,48.2],[14.6,48.21]"), testing::Not(apart));
+  const auto plan = core::value_or_throw(build_map({write("a.geojson", track_of("[15.6,48.2],[15.6,48.21]"))}, {}));
+  ASSERT_TRUE(plan.map.save(in_folder("plan.map")).ok());
+  const auto both = core::value_or_throw(
+      build_map({in_folder("plan.map"), write("b.geojson", track_of("[48.3,15.6],[48.31,15.6]"))}, {}));
+  EXPECT_THAT(both.map.problems, testing::Contains(HasSubstr(" km from those of plan.map, and would lie 11 km")));
+}
+
+TEST_F(BuildTest, WhatCrsIsTakenForIsSaid) {
+  auto plan = core::value_or_throw(build_map({write("a.geojson", track_of("[15.6,48.2],[15.6,48.21]"))}, {})).map;
+  const std::string crs = std::exchange(plan.crs, "");
+  ASSERT_TRUE(plan.save(in_folder("plan.map")).ok());
+  const auto built = core::value_or_throw(build_map({in_folder("plan.map")}, {.crs = crs}));
+  EXPECT_EQ(built.crs_remark,
+            "plan.map names no coordinate system: its coordinates stay as they are and are taken as " + crs + "'s");
+  EXPECT_EQ(core::value_or_throw(build_map({in_folder("plan.map")}, {})).crs_remark, "");
+}
+
 // Nor can the file itself, unless it says where it lies.
 TEST_F(BuildTest, TracksBesideTheBoundsThatTheFileDeclaresAreTold) {
   const auto problems = [&](const std::string& name, const std::string& text) {

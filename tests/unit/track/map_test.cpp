@@ -203,6 +203,23 @@ TEST(Map, ParsesPositions) {
   }
 }
 
+TEST(Map, WhatMeansSeveralEdgesIsRefused) {
+  Map map = small_map();
+  map.edges[2].name = "2";
+  const auto said = [&](const char* text) { return map.parse_position(text).error().message; };
+  EXPECT_EQ(said("2:10"),
+            "\"2\" is the number of one edge and the name of another; write one of edge/2, edge/3 instead");
+  EXPECT_EQ(map.parse_position("edge/2:10").value().edge, 2U);
+  EXPECT_EQ(map.parse_position("edge/3:10:-").value().edge, 3U);
+  EXPECT_EQ(map.edge_text(2), "edge/2");
+  EXPECT_EQ(map.edge_text(3), "3");
+  map.edges[1].name = map.edges[0].name = "main";
+  EXPECT_EQ(said("main:10"), "\"main\" is the name of 2 edges; write one of edge/1, edge/2 instead");
+  EXPECT_FALSE(map.parse_position("edge/4:10").ok());
+  map.edges[2].name = "3";
+  EXPECT_EQ(map.parse_position("3:10").value().edge, 3U) << "its number and its name";
+}
+
 // Pieces may lie anywhere in the map; a line of the same name elsewhere does not go on.
 TEST(Map, PlacesCountOnOverPiecesThatMeet) {
   Map map = small_map();

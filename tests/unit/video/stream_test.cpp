@@ -5,6 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "support/film_file.hpp"
 #include "unit/dataset/temporary_folder.hpp"
 #include "video/gstreamer.hpp"
 
@@ -25,13 +26,7 @@ class StreamTest : public railfix::testing::TemporaryFolder {
   static void make(const std::string& description) {
     auto pipeline = parse_pipeline(description);
     ASSERT_TRUE(pipeline.ok()) << pipeline.error().message;
-    gst_element_set_state(pipeline.value().get(), GST_STATE_PLAYING);
-    const Bus bus(gst_element_get_bus(pipeline.value().get()));
-    const Message end(gst_bus_timed_pop_filtered(bus.get(), 60 * GST_SECOND,
-                                                 static_cast<GstMessageType>(GST_MESSAGE_EOS | GST_MESSAGE_ERROR)));
-    ASSERT_TRUE(end);
-    EXPECT_EQ(GST_MESSAGE_TYPE(end.get()), GST_MESSAGE_EOS) << error_text(end.get());
-    gst_element_set_state(pipeline.value().get(), GST_STATE_NULL);
+    railfix::testing::run_to_end(pipeline.value().get());
   }
   static std::string film(const std::string& encoder, const std::string& file) {
     return "videotestsrc num-buffers=20 pattern=ball ! video/x-raw,format=I420,width=320,height=240,framerate=20/1 ! " +
@@ -66,6 +61,21 @@ TEST_F(StreamTest, EveryPictureOfAFilm) {
     make(film(encoder, file));
     EXPECT_EQ(play(open_file(file, Pace::as_asked, Colours::grey)), std::pair(20, std::string("ended"))) << encoder;
   }
+}
+
+TEST_F(StreamTest, EveryPictureComesWithItsTime) {
+  constexpr int64_t kMs = 1'000'000;
+  const std::vector<int64_t> times_ns = {0, 40 * kMs, 80 * kMs, 200 * kMs, 210 * kMs, 500 * kMs};
+  const std::string file = root_ / "film";
+  railfix::testing::write_film(file, "openh264enc ! h264parse ! mp4mux", "25/1", times_ns);
+  auto opened = open_file(file, Pace::as_asked, Colours::grey);
+  ASSERT_TRUE(opened.ok()) << opened.error().message;
+  std::vector<int64_t> seen_ns;
+  for (auto next = opened.value()->next(seconds(60)); next.ok() && next.value();
+       next = opened.value()->next(seconds(60))) {
+    seen_ns.push_back(next.value()->at_ns.value_or(-1));
+  }
+  EXPECT_EQ(seen_ns, times_ns);
 }
 
 TEST_F(StreamTest, SoundIsLeftOut) {

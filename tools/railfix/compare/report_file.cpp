@@ -5,7 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "core/csv_table.hpp"
+#include "core/csv.hpp"
 #include "core/json_text.hpp"
 
 namespace railfix::compare {
@@ -25,23 +25,37 @@ core::Result<TimedReport> report_of(int64_t stamp_ns, const std::string& hex, in
   return TimedReport{stamp_ns, std::move(fields).value()};
 }
 
-core::Result<std::vector<TimedReport>> read_table(const fs::path& file, etcs::Baseline baseline) {
-  core::CsvTable table(file);
-  const size_t stamp = table.required({"stamp_ns", "time_ns"});
-  const size_t hex = table.required({"hex", "message"});
-  const auto given = table.optional({"baseline"});
-  std::vector<TimedReport> reports;
-  while (table.next()) {
-    auto report = report_of(table.integer(stamp), table.text(hex),
-                            given ? table.integer(*given) : static_cast<int64_t>(baseline));
-    if (report.ok()) {
-      reports.push_back(std::move(report).value());
+/// A row of a table with stamp, hex and, where the file says it, baseline.
+core::Result<TimedReport> read_row(const core::CsvReader& table, size_t stamp, size_t hex,
+                                   std::optional<size_t> baseline, etcs::Baseline otherwise) {
+  const auto stamp_ns = table.integer(stamp);
+  if (!stamp_ns.ok()) return stamp_ns.error();
+  const auto given = baseline ? table.integer(*baseline) : static_cast<int64_t>(otherwise);
+  if (!given.ok()) return given.error();
+  auto report = report_of(stamp_ns.value(), std::string(table.text(hex)), given.value());
+  return report.ok() ? report : table.error(report.error().message);
+}
+
+core::Result<ReportLog> read_table(const fs::path& file, etcs::Baseline baseline) {
+  auto opened = core::CsvReader::open(file);
+  if (!opened.ok()) return opened.error();
+  auto& table = opened.value();
+  const auto stamp = table.column({"stamp_ns", "time_ns"});
+  const auto hex = table.column({"hex", "message"});
+  if (!stamp || !hex)
+    return core::Error{file.string() + " line 1: has no column '" + (stamp ? "hex" : "stamp_ns") + "'"};
+  const auto given = table.column({"baseline"});
+  ReportLog log;
+  while (true) {
+    if (table.next()) {
+      log.take(read_row(table, *stamp, *hex, given, baseline));
+    } else if (table.status().ok()) {
+      return log;
     } else {
-      table.refuse(report.error().message);
+      log.lines_refused.push_back(table.status().error().message);
+      if (!table.pass_over()) return table.status().error();
     }
   }
-  if (!table.status().ok()) return table.status().error();
-  return reports;
 }
 
 core::Result<TimedReport> read_line(const std::string& line, etcs::Baseline baseline) {
@@ -58,20 +72,20 @@ core::Result<TimedReport> read_line(const std::string& line, etcs::Baseline base
   return report_of(stamp.get<int64_t>(), hex.get<std::string>(), given.get<int64_t>());
 }
 
-core::Result<std::vector<TimedReport>> read_lines(const fs::path& file, etcs::Baseline baseline) {
+core::Result<ReportLog> read_lines(const fs::path& file, etcs::Baseline baseline) {
   std::ifstream stream(file);
   if (!stream) return core::Error{file.string() + ": cannot be read; does it exist?"};
-  std::vector<TimedReport> reports;
+  ReportLog log;
   size_t number = 0;
   for (std::string line; std::getline(stream, line);) {
     ++number;
     if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
     auto report = read_line(line, baseline);
-    if (!report.ok())
-      return core::Error{file.string() + " line " + std::to_string(number) + ": " + report.error().message};
-    reports.push_back(std::move(report).value());
+    log.take(report.ok()
+                 ? std::move(report)
+                 : core::Error{file.string() + " line " + std::to_string(number) + ": " + report.error().message});
   }
-  return reports;
+  return log;
 }
 
 }  // namespace
@@ -83,13 +97,22 @@ core::Status check_stamp(int64_t stamp_ns) {
                      std::to_string(kLastNs) + "."};
 }
 
-core::Result<std::vector<TimedReport>> read_reports(const fs::path& file, etcs::Baseline baseline) {
+void ReportLog::take(core::Result<TimedReport> line) {
+  if (line.ok()) {
+    reports.push_back(std::move(line).value());
+  } else {
+    lines_refused.push_back(line.error().message);
+  }
+}
+
+core::Result<ReportLog> read_reports(const fs::path& file, etcs::Baseline baseline) {
   const fs::path table = fs::is_directory(file) ? file / "tpr.csv" : file;
-  auto reports = table.extension() == ".jsonl" ? read_lines(table, baseline) : read_table(table, baseline);
-  if (!reports.ok()) return reports;
-  std::stable_sort(reports.value().begin(), reports.value().end(),
-                   [](const TimedReport& a, const TimedReport& b) { return a.stamp_ns < b.stamp_ns; });
-  return reports;
+  auto log = table.extension() == ".jsonl" ? read_lines(table, baseline) : read_table(table, baseline);
+  if (!log.ok()) return log;
+  auto& [reports, refused] = log.value();
+  if (reports.empty() && !refused.empty()) return core::Error{refused.front()};
+  std::ranges::stable_sort(reports, {}, &TimedReport::stamp_ns);
+  return log;
 }
 
 }  // namespace railfix::compare

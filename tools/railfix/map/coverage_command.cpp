@@ -36,9 +36,8 @@ struct CoverageRequest {
 std::string place_text(const track::Path& path, double distance_m) {
   const track::EdgePosition place = path.position_at(distance_m);
   char text[64];
-  std::snprintf(text, sizeof text, "%u:%.0f%s", place.edge, place.offset_m,
-                place.direction == track::Direction::reverse ? ":-" : "");
-  return text;
+  std::snprintf(text, sizeof text, ":%.0f%s", place.offset_m, place.direction == track::Direction::reverse ? ":-" : "");
+  return path.map().edge_text(place.edge) + text;
 }
 
 CoverageOptions options_of(const CoverageRequest& request) {
@@ -87,8 +86,8 @@ ordered_json coverage_json(const track::Path& path, const Coverage& found) {
 std::string group_place_text(const track::Path& path, double distance_m) {
   const track::EdgePosition place = path.position_at(distance_m);
   char text[64];
-  std::snprintf(text, sizeof text, "%u:%.1f", place.edge, std::floor(10 * place.offset_m) / 10);
-  return text;
+  std::snprintf(text, sizeof text, ":%.1f", std::floor(10 * place.offset_m) / 10);
+  return path.map().edge_text(place.edge) + text;
 }
 
 ordered_json groups_json(const track::Path& path, const std::vector<GroupGap>& gaps) {

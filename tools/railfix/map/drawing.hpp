@@ -15,7 +15,7 @@ namespace railfix::tool {
 struct DrawOptions {
   double width_px = 1600;
   std::optional<track::EdgePosition> around{};  // this place in the middle; the whole map without
-  double radius_m = 1000;
+  double radius_m = 1000;                       // no further than the map reaches
 };
 
 /// Shapes in pixels, x to the right, y down; drawn in their order.

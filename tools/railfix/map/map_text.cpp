@@ -8,6 +8,7 @@
 
 #include "core/units.hpp"
 #include "track/import/scale.hpp"
+#include "track/import/whereabouts.hpp"
 
 namespace railfix::tool {
 
@@ -62,6 +63,9 @@ void print_problems(const std::vector<std::string>& problems, size_t most) {
 void print_summary(const track::Map& map) {
   std::printf("map              %s, from %s\n", map.name.c_str(), map.source.c_str());
   std::printf("coordinates      %s\n", map.crs.empty() ? "local metres, no latitude and longitude" : map.crs.c_str());
+  if (const auto middle = track::middle_on_earth(map)) {
+    std::printf("lies around      latitude %.3f, longitude %.3f\n", middle->lat_deg, middle->lon_deg);
+  }
   if (const auto scale = track::scale_over(map)) {
     std::printf("scale            %+.2f to %+.2f m per km on the map\n", scale->least_m_per_km, scale->most_m_per_km);
   }
