@@ -113,8 +113,9 @@ Interval Estimator::widened(const Interval& interval) const {
   // A wheel that slides counts less than it is judged by.
   const double slide_m = slip_m / (1 - std::min(p.wheel_slip_share, 0.9));
   const auto& u = unwatched_;
-  return {interval.rear_m - std::min(slip_m + u.hidden_m + u.counted.most.behind_m + u.felt.most.behind_m, most_m),
-          interval.front_m + std::min(slide_m + u.hidden_m + u.counted.most.ahead_m + u.felt.most.ahead_m, most_m)};
+  Sides more{slip_m + u.hidden_m, slide_m + u.hidden_m};
+  for (const Apart& one : {u.counted, u.refused, u.felt}) more.add(one.most);
+  return {interval.rear_m - std::min(more.behind_m, most_m), interval.front_m + std::min(more.ahead_m, most_m)};
 }
 
 double Estimator::gnss_bound_m() const {

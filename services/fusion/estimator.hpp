@@ -216,6 +216,7 @@ class Estimator {
     double hidden_m = 0;    // what slips may have added that pass for a change of speed
     double fastest_mps = 0;
     Apart counted{};  // its way less the train's while it was isolated: who is wrong is not known for certain
+    Apart refused{};  // steps of a camera that nobody else speaks for, which were refused one by one
     Apart felt{};     // what an IMU feels that the wheel does not say
   };
   static constexpr int kGnssProof = 30;

@@ -81,6 +81,8 @@ void Estimator::use(const OdometryInput& step) {
       compare_with_wheel(step, sigma_m);
     } else {
       slip_watch_.no_picture();
+      // One that is refused now and then always says the same where the film has pictures twice.
+      if (alone) unwatched_.refused.add(offer.residual);
       if (++camera.refused >= kRefusalsToIsolate && !blame_wheel_on_trial()) {
         if (alone && !camera.isolated) doubts_.odometers_m += camera.refused * std::abs(offer.residual);
         camera.isolate(step.stamp_ns);

@@ -304,5 +304,25 @@ const std::vector<CampaignRun> kRuns{
 
 INSTANTIATE_TEST_SUITE_P(Runs, OnceOutside, ::testing::ValuesIn(kRuns), [](const auto& run) { return run.param.name; });
 
+// A film of 25 pictures a second that somebody has made one of 30: every sixth is there twice, which odometry finds,
+// and the step behind it covers twice the time of the others, which cover too little.
+TEST(Film, ThatHasEverySixthPictureTwiceIsHeld) {
+  auto fusion = fusion_at(1000);
+  const auto way_m = [](double t_s) { return t_s < 10 ? t_s * t_s : 100 + 20 * (t_s - 10); };
+  const auto shown_s = [](int picture) { return std::floor(picture * 25 / 30.0) / 25; };
+  int reference = 0;
+  for (int picture = 1; picture < 30 * 40; ++picture) {
+    const bool twice = shown_s(picture) == shown_s(picture - 1);
+    const double step_m = way_m(shown_s(picture)) - way_m(shown_s(reference));
+    const auto state =
+        fusion.add(OdometryInput{at(picture / 30.0), at(reference / 30.0), twice ? 0 : step_m, 0.001, !twice});
+    if (!twice) reference = picture;
+    if (!state) continue;
+    const double error_m = state->distance_m - way_m(shown_s(picture));
+    EXPECT_LE(error_m, state->over_m) << picture / 30.0 << " s";
+    EXPECT_LE(-error_m, state->under_m) << picture / 30.0 << " s";
+  }
+}
+
 }  // namespace
 }  // namespace railfix::fusion
