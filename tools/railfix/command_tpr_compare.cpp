@@ -139,6 +139,7 @@ void print_pairs(const compare::Pairing& pairing, const std::optional<compare::J
   double mean_m = 0;
   for (const double d : differences) mean_m += d / static_cast<double>(differences.size());
   std::vector<double> sizes;
+  sizes.reserve(differences.size());
   for (const double d : differences) sizes.push_back(std::abs(d));
   const auto size = evaluation::summarise(sizes);
   std::printf(
