@@ -291,12 +291,13 @@ void TrackDetector::forget(TrackObservation& observation) const {
 
 const char* TrackDetector::outside_limits(const TrackShape& shape) const {
   static constexpr const char* kReasons[] = {
-      "the roll is outside the suspension limits", "the pitch is outside the suspension limits",
-      "the yaw is outside the suspension limits", "the sideways position is outside the suspension limits",
-      "the height is outside the suspension limits"};
+      "the roll is outside the suspension limits",   "the pitch is outside the suspension limits",
+      "the yaw is outside the suspension limits",    "the sideways position is outside the suspension limits",
+      "the height is outside the suspension limits", "the curvature is outside the limits",
+      "the vertical curvature is outside the limits"};
   const ShapeVector deviation = to_vector(shape) - to_vector(mount_);
   const ShapeVector sigma = to_vector(options_.limits);
-  for (int k = 0; k < 5; ++k) {
+  for (int k = 0; k < 7; ++k) {
     if (std::abs(deviation(k)) > 4 * sigma(k)) return kReasons[k];
   }
   return nullptr;

@@ -187,6 +187,20 @@ TEST(TrackDetector, RefusesRailsOfAnotherGauge) {
   EXPECT_FALSE(detector.detect(render(scene)).seen());
 }
 
+// Over a switch a pair of legs that do not belong together looks like a hump that no railway has.
+TEST(TrackDetector, RefusesABendThatNoTrackHas) {
+  Scene scene = shaken_curve(1.0 / 250);
+  scene.shape.vertical_curvature_per_m = -0.003;
+  DetectorOptions options;
+  EXPECT_FALSE(TrackDetector(kCab, kMount, options).detect(render(scene)).seen());
+  options.limits.vertical_curvature_per_m = 0.002;
+  EXPECT_TRUE(TrackDetector(kCab, kMount, options).detect(render(scene)).seen());
+  scene.shape.vertical_curvature_per_m = 0;
+  options.limits.curvature_per_m = 0.0008;
+  const auto bent = TrackDetector(kCab, kMount, options).detect(render(scene));
+  EXPECT_FALSE(bent.seen()) << bent.shape.curvature_per_m;
+}
+
 /// Both legs of a switch in one picture; `leg` lies on the track of `scene` as the other one.
 cv::Mat two_legs(const Scene& scene, const Branch& branch) {
   Scene other = scene;
