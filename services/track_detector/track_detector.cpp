@@ -20,6 +20,7 @@ constexpr double kSupportM = 0.02;  // ... or this supports the rail
 constexpr double kClosePx = 0.6;    // edges of rails lie together, those of noise anywhere within the support
 constexpr double kQuietGrey = 0.5;  // noise of a picture without any
 constexpr double kLeastClear = 1.5;
+constexpr double kLeastClearOfPair = 1.2;  // of one rail, where the other makes up for it
 constexpr double kLoneShare = 0.65;        // of the stations, where no other rail at the gauge vouches for one, ...
 constexpr double kLoneDisplacement = 2.0;  // ... sigmas squared, ...
 constexpr double kLoneSigmaM = 0.03;       // ... and it may be the other edge of its head, or a shadow's
@@ -44,6 +45,12 @@ constexpr double kUnsureLeg = 0.7;      // of the confidence while the own leg i
 constexpr double kSure = 0.8;           // confidence that ends the search
 constexpr double kTrackReachM = 0.08;   // how far rails are looked for from the previous picture's ...
 constexpr double kSearchReachM = 0.10;  // ... and from the search's
+
+/// They come first.
+size_t left_count(const std::vector<RailEdge>& edges) {
+  return static_cast<size_t>(
+      std::count_if(edges.begin(), edges.end(), [](const RailEdge& edge) { return edge.point.side == Side::left; }));
+}
 
 int rails(const TrackObservation& o) {
   return (o.seen_left ? 1 : 0) + (o.seen_right ? 1 : 0);
@@ -75,7 +82,6 @@ TrackDetector::TrackDetector(const geometry::Intrinsics& camera, const geometry:
   top_view_ = std::make_unique<TopView>(camera, mount, size);
   search_ = std::make_unique<RailSearch>(*top_view_, search_limits_, options.gauge_m, options.head_m);
   points_.reserve(kMostPoints);
-  rail_.reserve(kMostPoints);
   clear_.reserve(kMostPoints);
   for (TrackObservation* one : {&observation_, &found_, &trial_}) {
     one->points.reserve(kMostPoints);
@@ -233,13 +239,18 @@ void TrackDetector::judge(const std::vector<RailEdge>& edges, const std::array<i
   } else if (clearness(edges, fit.residuals_px) < kLeastClear) {
     observation.reason = "the rails stand out no more than noise does";
   } else {
-    observation.seen_left = share[0] >= options_.min_supported;
-    observation.seen_right = share[1] >= options_.min_supported;
-    if (!observation.seen()) observation.reason = "too few rows show both rails";
+    const std::span all(edges);
+    const std::span residuals_px(fit.residuals_px);
+    const size_t lefts = left_count(edges);
+    const double left = clearness(all.first(lefts), residuals_px.first(lefts));
+    const double right = clearness(all.subspan(lefts), residuals_px.subspan(lefts));
+    observation.seen_left = share[0] >= options_.min_supported && left >= kLeastClearOfPair;
+    observation.seen_right = share[1] >= options_.min_supported && right >= kLeastClearOfPair;
+    if (!observation.seen()) observation.reason = "too few rows show both rails, or no clearer than noise";
   }
 }
 
-double TrackDetector::clearness(const std::vector<RailEdge>& edges, const std::vector<double>& residuals_px) {
+double TrackDetector::clearness(std::span<const RailEdge> edges, std::span<const double> residuals_px) {
   clear_.clear();
   int supported = 0;
   int close = 0;
@@ -264,20 +275,18 @@ double TrackDetector::support_px(const RailEdge& edge) const {
 void TrackDetector::keep_one_rail(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried,
                                   TrackObservation& observation) {
   const Side side = observation.seen_left ? Side::left : Side::right;
+  const size_t lefts = left_count(edges);
+  const std::span all(edges);
+  const auto rail = side == Side::left ? all.first(lefts) : all.subspan(lefts);
   points_.clear();
-  rail_.clear();
-  for (const auto& edge : edges) {
-    if (edge.point.side != side) continue;
-    points_.push_back(edge.point);
-    rail_.push_back(edge);
-  }
+  for (const auto& edge : rail) points_.push_back(edge.point);
   std::erase_if(observation.points, [side](const EdgePoint& point) { return point.side != side; });
   const double whole = static_cast<double>(observation.points.size()) / std::max(1, tried[side == Side::left ? 0 : 1]);
   const RailFit& one = fit(points_, observation.shape, true, kLoneSigmaM);
   if (whole < kLoneShare || !is_usual(one.shape) || outside_limits(one.shape) != nullptr ||
-      clearness(rail_, one.residuals_px) < kLeastClear) {
+      clearness(rail, one.residuals_px) < kLeastClear) {
     observation.seen_left = observation.seen_right = false;
-    observation.reason = "too few rows show both rails, and one alone is doubtful";
+    observation.reason = "one rail is not to be seen, and the other alone is doubtful";
     return;
   }
   observation.shape = one.shape;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -87,8 +88,8 @@ class TrackDetector {
   [[nodiscard]] double support_px(const RailEdge& edge) const;
   void judge(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried, const RailFit& fit,
              TrackObservation& observation);
-  /// How far the edges stand out of the noise and lie together: noise is below 1.5, rails above.
-  double clearness(const std::vector<RailEdge>& edges, const std::vector<double>& residuals_px);
+  /// How far edges stand out of the noise and lie together: noise is below 1.5, rails above.
+  double clearness(std::span<const RailEdge> edges, std::span<const double> residuals_px);
   /// Nothing is left where the one rail is doubtful.
   void keep_one_rail(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried,
                      TrackObservation& observation);
@@ -114,7 +115,6 @@ class TrackDetector {
   EdgeFinder edge_finder_;
   RailFitter fitter_;
   std::vector<EdgePoint> points_;
-  std::vector<RailEdge> rail_;  // edges of one
   std::vector<double> clear_;
   TrackObservation observation_;  // the answer
   TrackObservation found_;        // of one kind of rails

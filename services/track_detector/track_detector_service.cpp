@@ -140,7 +140,10 @@ void TrackDetectorService::detect(const msg::CameraFrame& frame) {
   }
   const double factor = messaging::sigma_factor(frame.health());
   observation.covariance *= factor * factor;
-  if (observation.seen()) watch_->add(observation.shape, core::seconds(frame.stamp_ns() - last_stamp_ns_));
+  if (observation.seen()) {
+    watch_->add(observation.shape, std::sqrt(observation.covariance(5, 5)),
+                core::seconds(frame.stamp_ns() - last_stamp_ns_));
+  }
   last_stamp_ns_ = frame.stamp_ns();
   if (context_.in_charge()) publish(observation, frame);
   if (observation.seen()) find_landmarks(grey, observation, frame);
