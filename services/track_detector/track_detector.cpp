@@ -147,7 +147,7 @@ void TrackDetector::search(const cv::Mat& grey, bool dark, TrackObservation& bes
   best.clear();
   best.reason = "no pair of rails at the gauge";
   forget(best);
-  for (const auto& candidate : search_->find(top_view_->ridges(dark), kCandidates)) {
+  for (const auto& candidate : search_->find(top_view_->ridges(dark), kCandidates, misses_ / 2)) {
     if (candidate.score < kMinSearchScore) continue;
     refine(grey, candidate.shape, dark, kSearchReachM, trial_);
     if (is_better(trial_, best)) std::swap(best, trial_);

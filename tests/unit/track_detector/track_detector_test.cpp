@@ -81,6 +81,37 @@ TEST(TrackDetector, FindsRailsWhenThePoseIsDegreesAndDecimetresWrong) {
   EXPECT_LT(worst_offset_m(observation, scene, 30), 0.02);
 }
 
+// A mount that nobody knows, metre gauge and curves of 50 m: more than a picture has time for.
+TEST(TrackDetector, TriesWideLimitsInTurns) {
+  DetectorOptions options;
+  options.gauge_m = 1.0;
+  options.limits = {0.024, 0.024, 0.06, 0.3, 0.12, 0.02, 0.0005, 3e-5};
+  SearchLimits limits;
+  limits.pitch_rad = 0.072;
+  limits.yaw_rad = 0.18;
+  limits.lateral_m = 1.1;
+  limits.height_fraction = 0.14;
+  limits.curvature_per_m = 0.04;
+  TopViewSize size;
+  size.half_width_m = 5;
+  const TopView view(kCab, kMount, size);
+  const int turns = RailSearch(view, limits, options.gauge_m, options.head_m).turns();
+  EXPECT_GT(turns, 1);
+  EXPECT_EQ(RailSearch(view, {}, options.gauge_m, options.head_m).turns(), 1);
+  for (const double curvature_per_m : {0.0, 1.0 / 60, -1.0 / 110}) {
+    Scene scene;
+    scene.gauge_m = options.gauge_m;
+    scene.shape.camera = kMount;
+    scene.shape.camera.yaw_rad += 0.03;
+    scene.shape.curvature_per_m = curvature_per_m;
+    const cv::Mat grey = render(scene);
+    TrackDetector detector(kCab, kMount, options);
+    int pictures = 0;
+    while (pictures < 2 * turns + 2 && !detector.detect(grey).seen()) ++pictures;
+    EXPECT_LT(pictures, 2 * turns + 2) << curvature_per_m;
+  }
+}
+
 TEST(TrackDetector, FindsDarkRailsOnLightGround) {
   Scene scene = shaken_curve(0);
   scene.rail_grey = 60;
