@@ -114,13 +114,12 @@ void OdometryService::take_pose(const Waiting& waiting, const msg::TrackView* vi
   picture.pose = fresh ? last_pose_ : mount_;
   picture.curvature_per_m = curvature_per_m_;
   picture.vertical_curvature_per_m = vertical_curvature_per_m_;
-  if (view == nullptr || (view->seen_left() == 0 && view->seen_right() == 0)) return;
+  if (view == nullptr || !messaging::has_seen(*view)) return;
   const auto sigma = [view](size_t place) { return std::sqrt(std::max(0.0, view->covariance()[place])); };
   PoseTrust trust;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) trust.covariance(i, j) = view->covariance()[kPoseCovariance[i][j]];
   }
-  if (!trust.covariance.allFinite() || !std::isfinite(view->pitch_rad())) return;
   if (!(trust.pitch_sigma_rad() < config_.mouse.mount_pitch_sigma_rad)) return;
   if (sigma(messaging::kCurvatureVariance) < kWorstCurvatureSigma) curvature_per_m_ = view->curvature_per_m();
   vertical_curvature_per_m_ = view->vertical_curvature_per_m();

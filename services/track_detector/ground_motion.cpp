@@ -18,6 +18,7 @@ constexpr double kAgreeMps2 = 4.0;
 constexpr double kAgreeM = 0.03;
 constexpr double kSpeedHoldsS = 0.15;  // one bad match, as over points, must not lead to the next sleeper
 constexpr int64_t kPatienceNs = core::kNsPerSecond;
+constexpr double kLongestGapS = 0.5;  // of pictures; the speed may have changed by more than the window
 constexpr int64_t kLookElsewhereNs = core::kNsPerSecond / 2;
 constexpr double kBetterBy = 0.05;  // in correlation (0.97, and 0.7 to 0.88 at the next sleeper), ...
 constexpr int kBetterLooks = 2;     // ... so often
@@ -120,7 +121,7 @@ std::optional<double> GroundMotion::step(const vision::TopView& view, const visi
   take_profile(view, sheet);
   const double dt_s = core::seconds(stamp_ns - stamp_ns_);
   stamp_ns_ = stamp_ns;
-  if (first || dt_s <= 0 || before_.size() != now_.size()) {
+  if (first || dt_s <= 0 || dt_s > kLongestGapS || before_.size() != now_.size()) {
     speed_mps_.reset();
     locked_ = false;
     measured_ns_ = stamp_ns;

@@ -111,6 +111,7 @@ std::optional<double> EdgeBrightness::swallowed_px(double darker) const {
 EdgeProfile::EdgeProfile() {
   values_.reserve(kUsualSamples);
   sums_.reserve(kUsualSamples + 1);
+  steps_.reserve(kUsualSamples);
 }
 
 bool EdgeProfile::take(const cv::Mat& grey, const Eigen::Vector2d& first, const Eigen::Vector2d& outward_px,
@@ -136,6 +137,16 @@ double EdgeProfile::mean(int first, int last) const {
   first = std::clamp(first, 0, size() - 1);
   last = std::clamp(last, first + 1, size());
   return (sums_[static_cast<size_t>(last)] - sums_[static_cast<size_t>(first)]) / (last - first);
+}
+
+double EdgeProfile::noise() {
+  constexpr auto kPixel = static_cast<size_t>(1 / kStepPx);
+  if (values_.size() <= kPixel) return 0;
+  steps_.clear();
+  for (size_t i = kPixel; i < values_.size(); ++i) steps_.push_back(std::abs(values_[i] - values_[i - kPixel]));
+  const auto middle = steps_.begin() + static_cast<ptrdiff_t>(steps_.size() / 2);
+  std::nth_element(steps_.begin(), middle, steps_.end());
+  return *middle;
 }
 
 const std::vector<RailEdge>& EdgeFinder::find(const cv::Mat& grey, const geometry::Intrinsics& camera,
@@ -197,6 +208,7 @@ EdgeFinder::Look EdgeFinder::find_at(const cv::Mat& grey, const Place& place, co
   edge.point.sigma_px = std::hypot(kEdgeSigmaPx, kEdgeSigmaM * px_per_m);
   edge.offset_m = at * kStepPx / px_per_m;
   edge.contrast = crossing->contrast;
+  edge.noise = options.noise ? profile_.noise() : 0.0;
   edge.brighter = crossing->brighter;
   edge.darker = crossing->darker;
   return Look::found;

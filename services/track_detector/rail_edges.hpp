@@ -20,6 +20,7 @@ struct EdgeOptions {
   double min_contrast = 6;      // grey levels between the head and the ground inside of it
   double smallest_head_px = 3;  // narrower ones, far away, are biased by blur
   bool dark = false;            // the head is darker than both its sides
+  bool noise = false;           // say the noise, which costs time
 };
 
 struct RailEdge {
@@ -27,6 +28,7 @@ struct RailEdge {
   double ahead_m = 0;   // of the station; only as right as the shape it was looked for with
   double offset_m = 0;  // outwards from the expected place
   double contrast = 0;  // grey levels
+  double noise = 0;     // grey levels, of the profile that it was found in
   double brighter = 0;  // grey level of the edge's brighter side, ...
   double darker = 0;    // ... and of the other
 };
@@ -52,11 +54,14 @@ class EdgeProfile {
   bool take(const cv::Mat& grey, const Eigen::Vector2d& first, const Eigen::Vector2d& outward_px,
             const Eigen::Vector2d& along, int count);
   [[nodiscard]] double mean(int first, int last) const;
+  /// How much neighbouring pixels differ, in the median: edges do not count, noise does.
+  [[nodiscard]] double noise();
   [[nodiscard]] int size() const { return static_cast<int>(values_.size()); }
 
  private:
   std::vector<double> values_;
   std::vector<double> sums_;
+  std::vector<double> steps_;
 };
 
 /// Keeps its buffers between pictures.

@@ -10,6 +10,7 @@ namespace {
 constexpr int kCoarse = 2;
 constexpr int kSpread = 2;
 constexpr double kSpreadColumns = 3.0;
+constexpr double kMostCells = 6e7;  // to add up in one picture: some 40 ms, ten times the usual
 constexpr double kHandicap = 0.03;     // of the score at each limit
 constexpr double kWorthKeeping = 0.5;  // of the best score
 
@@ -48,6 +49,9 @@ RailSearch::RailSearch(const TopView& view, const SearchLimits& limits, double g
   yaws_ = steps(limits.yaw_rad, yaw_step);
   pitches_ = steps(limits.pitch_rad, yaw_step * std::min(4.0, 2.0 * height_m / width_m_));
   curvatures_ = steps(limits.curvature_per_m, 8.0 * spread_m / (far_m * far_m));
+  const double hypotheses = static_cast<double>(pitches_.size() * yaws_.size() * curvatures_.size());
+  const double cells = hypotheses * row_count_ * (left_grid_.count + right_grid_.count);
+  turns_ = std::clamp(static_cast<int>(std::ceil(cells / kMostCells)), 1, static_cast<int>(curvatures_.size()));
   slack_ = std::max(1, static_cast<int>(std::lround(width_m_ / height_m * limits.height_fraction / left_grid_.step)));
   for (int k = 0; k < left_grid_.count + right_grid_.count; ++k) {
     const double slope = left_grid_.first + right_grid_.first + k * left_grid_.step;
@@ -101,7 +105,7 @@ void RailSearch::sum(const SlopeGrid& grid, ShiftableRows& rows) const {
   for (auto& value : rows.sums) value /= static_cast<float>(row_count_);
 }
 
-void RailSearch::coarse() {
+void RailSearch::coarse(int turn) {
   found_.clear();
   best_ = 0;
   for (const double pitch : pitches_) {
@@ -112,7 +116,8 @@ void RailSearch::coarse() {
       shift_per_yaw_[static_cast<size_t>(k)] = 1 / (b * left_grid_.step);
       shift_per_curvature_[static_cast<size_t>(k)] = view_.pose().height_m / (2 * b * b * left_grid_.step);
     }
-    for (const double curvature : curvatures_) {
+    for (size_t i = static_cast<size_t>(turn % turns_); i < curvatures_.size(); i += static_cast<size_t>(turns_)) {
+      const double curvature = curvatures_[i];
       for (const double yaw : yaws_) {
         for (size_t k = 0; k < shifts_.size(); ++k) {
           const double shift = curvature * shift_per_curvature_[k] - yaw * shift_per_yaw_[k];
@@ -265,10 +270,10 @@ void RailSearch::spread(const cv::Mat& ridges) {
   }
 }
 
-const std::vector<RailCandidate>& RailSearch::find(const cv::Mat& ridges, size_t max_candidates) {
+const std::vector<RailCandidate>& RailSearch::find(const cv::Mat& ridges, size_t max_candidates, int turn) {
   // Coarse steps are allowed because every ridge is spread by as much as a step moves a line.
   spread(ridges);
-  coarse();
+  coarse(turn);
   candidates_.clear();
   kept_.clear();
   const double worth = kWorthKeeping * best_;

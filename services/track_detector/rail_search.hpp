@@ -47,7 +47,11 @@ class RailSearch {
   RailSearch(const TopView& view, const SearchLimits& limits, double gauge_m, double head_m);
 
   /// The best candidates, best first, well apart from each other; may be empty. `ridges`: TopView's scores.
-  const std::vector<RailCandidate>& find(const cv::Mat& ridges, size_t max_candidates);
+  /// Where limits are so wide that all curvatures would take too long, they take turns, evenly over the whole range:
+  /// `turn` counts the pictures.
+  const std::vector<RailCandidate>& find(const cv::Mat& ridges, size_t max_candidates, int turn = 0);
+  /// Pictures that it takes to try all.
+  [[nodiscard]] int turns() const { return turns_; }
 
  private:
   /// Slopes that one rail may have: first, first + step, ...
@@ -67,7 +71,7 @@ class RailSearch {
   void resample(const SlopeGrid& grid, double pitch_rad, ShiftableRows& rows) const;
   void sum(const SlopeGrid& grid, ShiftableRows& rows) const;
   void spread(const cv::Mat& ridges);
-  void coarse();
+  void coarse(int turn);
   void try_coarse(const RailHypothesis& h);
   [[nodiscard]] RailHypothesis refined(RailHypothesis h, const cv::Mat& ridges) const;
   bool try_move(RailHypothesis& h, const double (&move)[5], double sign, const cv::Mat& ridges) const;
@@ -88,6 +92,7 @@ class RailSearch {
   std::vector<double> pitches_;
   std::vector<double> yaws_;
   std::vector<double> curvatures_;
+  int turns_ = 1;
   std::vector<float> lateral_handicap_;  // by the sum of both rails' indices
   cv::Mat spread_;
   ShiftableRows left_;

@@ -13,11 +13,19 @@ constexpr double kSigmas = 3.0;       // limits of the search, in sigmas of the 
 constexpr double kSearchFarM = 28.0;  // farther, pitch errors move the rails too much for a coarse search
 constexpr double kMinSearchScore = 0.12;
 constexpr size_t kCandidates = 4;
-constexpr int kPatience = 3;            // pictures without rails before the search saves time
-constexpr double kHopeful = 0.4;        // share of the places with an edge, below which a candidate is given up
-constexpr double kSupportPx = 1.5;      // a point within this of the fit ...
-constexpr double kSupportM = 0.02;      // ... or this supports the rail
-constexpr double kFitTolerance = 0.05;  // sigmas
+constexpr int kPatience = 3;        // pictures without rails before the search saves time
+constexpr double kHopeful = 0.4;    // share of the places with an edge, below which a candidate is given up
+constexpr double kSupportPx = 1.5;  // a point within this of the fit ...
+constexpr double kSupportM = 0.02;  // ... or this supports the rail
+constexpr double kClosePx = 0.6;    // edges of rails lie together, those of noise anywhere within the support
+constexpr double kQuietGrey = 0.5;  // noise of a picture without any
+constexpr double kLeastClear = 1.5;
+constexpr double kLeastClearOfPair = 1.2;  // of one rail, where the other makes up for it
+constexpr double kLoneShare = 0.65;        // of the stations, where no other rail at the gauge vouches for one, ...
+constexpr double kLoneDisplacement = 2.0;  // ... sigmas squared, ...
+constexpr double kLoneSigmaM = 0.03;       // ... and it may be the other edge of its head, or a shadow's
+constexpr int kMoment = 10;                // pictures
+constexpr double kFitTolerance = 0.05;     // sigmas
 constexpr double kLeastSigmaFactor = 0.15;
 constexpr int kFitIterations = 15;
 constexpr double kSettled = 0.5;  // sigmas; points that leave one by one keep a fit creeping
@@ -38,13 +46,27 @@ constexpr double kSure = 0.8;           // confidence that ends the search
 constexpr double kTrackReachM = 0.08;   // how far rails are looked for from the previous picture's ...
 constexpr double kSearchReachM = 0.10;  // ... and from the search's
 
+/// They come first.
+size_t left_count(const std::vector<RailEdge>& edges) {
+  return static_cast<size_t>(
+      std::count_if(edges.begin(), edges.end(), [](const RailEdge& edge) { return edge.point.side == Side::left; }));
+}
+
+int rails(const TrackObservation& o) {
+  return (o.seen_left ? 1 : 0) + (o.seen_right ? 1 : 0);
+}
+
+bool is_better(const TrackObservation& a, const TrackObservation& b) {
+  return rails(a) != rails(b) ? rails(a) > rails(b) : a.confidence > b.confidence;
+}
+
 }  // namespace
 
 TrackDetector::TrackDetector(const geometry::Intrinsics& camera, const geometry::CameraPose& mount,
                              const DetectorOptions& options)
     : camera_(camera), options_(options) {
   mount_.camera = mount;
-  usual_ = to_vector(mount_);
+  usual_ = last_ = to_vector(mount_);
   const auto& limits = options.limits;
   search_limits_.pitch_rad = kSigmas * limits.pitch_rad;
   search_limits_.yaw_rad = kSigmas * limits.yaw_rad;
@@ -60,6 +82,7 @@ TrackDetector::TrackDetector(const geometry::Intrinsics& camera, const geometry:
   top_view_ = std::make_unique<TopView>(camera, mount, size);
   search_ = std::make_unique<RailSearch>(*top_view_, search_limits_, options.gauge_m, options.head_m);
   points_.reserve(kMostPoints);
+  clear_.reserve(kMostPoints);
   for (TrackObservation* one : {&observation_, &found_, &trial_}) {
     one->points.reserve(kMostPoints);
     one->reason.reserve(kLongestReason);
@@ -90,10 +113,11 @@ const TrackObservation& TrackDetector::detect(const cv::Mat& grey, const std::op
     if (lost && dark != dark_) continue;
     if (!both && dark != (misses_ % 2 == 1)) continue;
     search(grey, dark, found_);
-    if (found_.confidence >= observation_.confidence) std::swap(observation_, found_);
+    if (!is_better(observation_, found_)) std::swap(observation_, found_);
     if (observation_.seen()) {
       choose_leg(grey, dark, observation_);
       previous_ = observation_.shape;
+      last_ = to_vector(observation_.shape);
       dark_ = dark;
       misses_ = 0;
       return observation_;
@@ -115,6 +139,7 @@ bool TrackDetector::follow(const cv::Mat& grey) {
   if (!observation_.seen()) return false;
   choose_leg(grey, dark_, observation_);
   previous_ = observation_.shape;
+  last_ = to_vector(observation_.shape);
   return true;
 }
 
@@ -122,16 +147,16 @@ void TrackDetector::search(const cv::Mat& grey, bool dark, TrackObservation& bes
   best.clear();
   best.reason = "no pair of rails at the gauge";
   forget(best);
-  for (const auto& candidate : search_->find(top_view_->ridges(dark), kCandidates)) {
+  for (const auto& candidate : search_->find(top_view_->ridges(dark), kCandidates, misses_ / 2)) {
     if (candidate.score < kMinSearchScore) continue;
     refine(grey, candidate.shape, dark, kSearchReachM, trial_);
-    const bool better = trial_.seen() != best.seen() ? trial_.seen() : trial_.confidence > best.confidence;
-    if (better) std::swap(best, trial_);
+    if (is_better(trial_, best)) std::swap(best, trial_);
     if (best.seen() && best.confidence > kSure) break;
   }
 }
 
-const RailFit& TrackDetector::fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last) {
+const RailFit& TrackDetector::fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last,
+                                  double rail_offset_sigma_m) {
   RailFitOptions fit_options;
   fit_options.gauge_m = options_.gauge_m;
   fit_options.prior = mount_;
@@ -141,7 +166,7 @@ const RailFit& TrackDetector::fit(const std::vector<EdgePoint>& points, const Tr
     fit_options.prior_sigma.roll_rad = std::min(roll_->sigma_rad, options_.limits.roll_rad);
   }
   fit_options.least_sigma_factor = last ? kLeastSigmaFactor : 0;
-  fit_options.rail_offset_sigma_m = options_.rail_offset_sigma_m;
+  fit_options.rail_offset_sigma_m = std::max(options_.rail_offset_sigma_m, rail_offset_sigma_m);
   fit_options.step_tolerance = kFitTolerance;
   fit_options.max_iterations = kFitIterations;
   return fitter_.fit(camera_, points, start, fit_options);
@@ -171,6 +196,7 @@ void TrackDetector::refine(const cv::Mat& grey, const TrackShape& start, bool da
     edge_options.far_m = far_m[pass];
     edge_options.reach_m = reach_m[pass];
     edge_options.stations = stations[pass];
+    edge_options.noise = pass == 2;
     edges = &edge_finder_.find(grey, camera_, shape, edge_options, tried.data());
     if (edges->size() < 8 || static_cast<double>(edges->size()) < kHopeful * (tried[0] + tried[1])) {
       observation.reason = "too few edges of rail heads";
@@ -186,17 +212,15 @@ void TrackDetector::refine(const cv::Mat& grey, const TrackShape& start, bool da
   observation.far_m = edge_options.far_m;
   judge(*edges, tried, *result, observation);
   if (observation.seen()) edge_finder_.learn(dark);
-  if (observation.seen_left != observation.seen_right) keep_one_rail(*edges, observation);
+  if (observation.seen_left != observation.seen_right) keep_one_rail(*edges, tried, observation);
   if (!observation.seen_left && !observation.seen_right) forget(observation);
 }
 
 void TrackDetector::judge(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried, const RailFit& fit,
-                          TrackObservation& observation) const {
-  const geometry::View view(camera_, fit.shape.camera);
+                          TrackObservation& observation) {
   std::array<int, 2> supported{};
   for (size_t i = 0; i < edges.size(); ++i) {
-    const double px_per_m = camera_.fu_px / std::max(1.0, edges[i].ahead_m);
-    if (std::abs(fit.residuals_px[i]) > std::max(kSupportPx, kSupportM * px_per_m)) continue;
+    if (std::abs(fit.residuals_px[i]) > support_px(edges[i])) continue;
     ++supported[edges[i].point.side == Side::left ? 0 : 1];
     observation.points.push_back(edges[i].point);
   }
@@ -212,30 +236,72 @@ void TrackDetector::judge(const std::vector<RailEdge>& edges, const std::array<i
     observation.reason = "the fit does not settle";
   } else if (const char* reason = outside_limits(fit.shape)) {
     observation.reason = reason;
+  } else if (clearness(edges, fit.residuals_px) < kLeastClear) {
+    observation.reason = "the rails stand out no more than noise does";
   } else {
-    observation.seen_left = share[0] >= options_.min_supported;
-    observation.seen_right = share[1] >= options_.min_supported;
-    if (!observation.seen()) observation.reason = "too few rows show both rails";
+    const std::span all(edges);
+    const std::span residuals_px(fit.residuals_px);
+    const size_t lefts = left_count(edges);
+    const double left = clearness(all.first(lefts), residuals_px.first(lefts));
+    const double right = clearness(all.subspan(lefts), residuals_px.subspan(lefts));
+    observation.seen_left = share[0] >= options_.min_supported && left >= kLeastClearOfPair;
+    observation.seen_right = share[1] >= options_.min_supported && right >= kLeastClearOfPair;
+    if (!observation.seen()) observation.reason = "too few rows show both rails, or no clearer than noise";
   }
 }
 
-// What was taken for the other rail must not bend the answer.
-void TrackDetector::keep_one_rail(const std::vector<RailEdge>& edges, TrackObservation& observation) {
-  const Side side = observation.seen_left ? Side::left : Side::right;
-  points_.clear();
-  for (const auto& edge : edges) {
-    if (edge.point.side == side) points_.push_back(edge.point);
+double TrackDetector::clearness(std::span<const RailEdge> edges, std::span<const double> residuals_px) {
+  clear_.clear();
+  int supported = 0;
+  int close = 0;
+  for (size_t i = 0; i < edges.size(); ++i) {
+    clear_.push_back(edges[i].contrast / (edges[i].noise + kQuietGrey));
+    const double off_px = std::abs(residuals_px[i]);
+    supported += off_px <= support_px(edges[i]) ? 1 : 0;
+    close += off_px <= kClosePx ? 1 : 0;
   }
+  if (supported == 0) return 0;
+  const auto middle = clear_.begin() + static_cast<std::ptrdiff_t>(clear_.size() / 2);
+  std::nth_element(clear_.begin(), middle, clear_.end());
+  return *middle * std::min(1.0, close / static_cast<double>(supported));
+}
+
+double TrackDetector::support_px(const RailEdge& edge) const {
+  return std::max(kSupportPx, kSupportM * camera_.fu_px / std::max(1.0, edge.ahead_m));
+}
+
+// What was taken for the other rail must not bend the answer. A line alone may be anything (a shadow, a kerb, the next
+// track's rail): it must be whole, clear, and where the camera is wont to have its rail.
+void TrackDetector::keep_one_rail(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried,
+                                  TrackObservation& observation) {
+  const Side side = observation.seen_left ? Side::left : Side::right;
+  const size_t lefts = left_count(edges);
+  const std::span all(edges);
+  const auto rail = side == Side::left ? all.first(lefts) : all.subspan(lefts);
+  points_.clear();
+  for (const auto& edge : rail) points_.push_back(edge.point);
   std::erase_if(observation.points, [side](const EdgePoint& point) { return point.side != side; });
-  const RailFit& one = fit(points_, observation.shape, true);
+  const double whole = static_cast<double>(observation.points.size()) / std::max(1, tried[side == Side::left ? 0 : 1]);
+  const RailFit& one = fit(points_, observation.shape, true, kLoneSigmaM);
+  if (whole < kLoneShare || !is_usual(one.shape) || outside_limits(one.shape) != nullptr ||
+      clearness(rail, one.residuals_px) < kLeastClear) {
+    observation.seen_left = observation.seen_right = false;
+    observation.reason = "one rail is not to be seen, and the other alone is doubtful";
+    return;
+  }
   observation.shape = one.shape;
   observation.covariance = one.covariance;
   observation.condition = one.condition;
   observation.residual_px = one.residual_px;
 }
 
-double TrackDetector::displacement(const TrackShape& shape) const {
-  const ShapeVector apart = to_vector(shape) - usual_;
+bool TrackDetector::is_usual(const TrackShape& shape) const {
+  return displacement(shape, usual_) < kLoneDisplacement ||
+         (misses_ < kMoment && displacement(shape, last_) < kLoneDisplacement);
+}
+
+double TrackDetector::displacement(const TrackShape& shape, const ShapeVector& from) const {
+  const ShapeVector apart = to_vector(shape) - from;
   const auto& limits = options_.limits;
   // However stiff the suspension is, over a switch the fit itself is no better than this.
   const double roll = apart(0) / std::max(limits.roll_rad, kLegRollRad);
@@ -254,7 +320,7 @@ void TrackDetector::choose_leg(const cv::Mat& grey, bool dark, TrackObservation&
   if (branch->from_m < near_m_ + kPartsNearM) {
     refine(grey, other_leg(observation.shape, *branch), dark, kSearchReachM, trial_);
     if (trial_.seen()) {
-      const double margin = displacement(observation.shape) - displacement(trial_.shape);
+      const double margin = displacement(observation.shape, usual_) - displacement(trial_.shape, usual_);
       if (margin > 0) std::swap(observation, trial_);
       if (std::abs(margin) > kSureMargin) return;
     }
@@ -291,12 +357,13 @@ void TrackDetector::forget(TrackObservation& observation) const {
 
 const char* TrackDetector::outside_limits(const TrackShape& shape) const {
   static constexpr const char* kReasons[] = {
-      "the roll is outside the suspension limits", "the pitch is outside the suspension limits",
-      "the yaw is outside the suspension limits", "the sideways position is outside the suspension limits",
-      "the height is outside the suspension limits"};
+      "the roll is outside the suspension limits",   "the pitch is outside the suspension limits",
+      "the yaw is outside the suspension limits",    "the sideways position is outside the suspension limits",
+      "the height is outside the suspension limits", "the curvature is outside the limits",
+      "the vertical curvature is outside the limits"};
   const ShapeVector deviation = to_vector(shape) - to_vector(mount_);
   const ShapeVector sigma = to_vector(options_.limits);
-  for (int k = 0; k < 5; ++k) {
+  for (int k = 0; k < 7; ++k) {
     if (std::abs(deviation(k)) > 4 * sigma(k)) return kReasons[k];
   }
   return nullptr;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -67,7 +68,7 @@ class TrackDetector {
   void reset() {
     previous_.reset();
     misses_ = 0;
-    usual_ = to_vector(mount_);
+    usual_ = last_ = to_vector(mount_);
     edge_finder_.forget();
   }
 
@@ -81,14 +82,23 @@ class TrackDetector {
   void refine(const cv::Mat& grey, const TrackShape& start, bool dark, double first_reach_m,
               TrackObservation& observation);
   /// `last`: of the passes, with an honest covariance.
-  const RailFit& fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last);
+  const RailFit& fit(const std::vector<EdgePoint>& points, const TrackShape& start, bool last,
+                     double rail_offset_sigma_m = 0);
+  /// An edge within this of the fit supports the rail.
+  [[nodiscard]] double support_px(const RailEdge& edge) const;
   void judge(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried, const RailFit& fit,
-             TrackObservation& observation) const;
-  void keep_one_rail(const std::vector<RailEdge>& edges, TrackObservation& observation);
+             TrackObservation& observation);
+  /// How far edges stand out of the noise and lie together: noise is below 1.5, rails above.
+  double clearness(std::span<const RailEdge> edges, std::span<const double> residuals_px);
+  /// Nothing is left where the one rail is doubtful.
+  void keep_one_rail(const std::vector<RailEdge>& edges, const std::array<int, 2>& tried,
+                     TrackObservation& observation);
+  /// Where the camera usually is, or was a moment ago.
+  [[nodiscard]] bool is_usual(const TrackShape& shape) const;
   /// Goes over to the other leg of a switch where the train stands better on it; else ends where the legs part.
   void choose_leg(const cv::Mat& grey, bool dark, TrackObservation& observation);
-  /// How far the pose is from where the camera usually is, in sigmas squared.
-  [[nodiscard]] double displacement(const TrackShape& shape) const;
+  /// How far the pose is from another (the usual one), in sigmas squared.
+  [[nodiscard]] double displacement(const TrackShape& shape, const ShapeVector& from) const;
   void end_at(double far_m, TrackObservation& observation);
   void forget(TrackObservation& observation) const;
   /// Why the pose cannot be; null when it can.
@@ -105,11 +115,13 @@ class TrackDetector {
   EdgeFinder edge_finder_;
   RailFitter fitter_;
   std::vector<EdgePoint> points_;
+  std::vector<double> clear_;
   TrackObservation observation_;  // the answer
   TrackObservation found_;        // of one kind of rails
   TrackObservation trial_;        // of one candidate, of one leg
   std::optional<TrackShape> previous_;
   ShapeVector usual_;  // slow mean of the pose
+  ShapeVector last_;   // pose of the last pair
   std::optional<RollHint> roll_;
   int misses_ = 0;     // pictures without rails in a row
   bool dark_ = false;  // the previous picture's rails are darker than the ground

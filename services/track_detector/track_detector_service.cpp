@@ -85,10 +85,9 @@ void TrackDetectorService::calibrated(const msg::CameraCalibration& c) {
   const geometry::Intrinsics camera = messaging::intrinsics_of(c);
   const geometry::CameraPose mount = messaging::mount_of(c);
   detector_.reset();
-  if (!(camera.fu_px > 0 && camera.fv_px > 0 && mount.height_m > 0.3) || camera.width_px < 64 ||
-      camera.height_px < 64) {
-    context_.health().degraded("camera_calibration of " + config_.camera +
-                               " has no focal length, size or height: run railfix calibrate mount");
+  why_unusable_ = messaging::why_unusable(c);
+  if (why_unusable_ != nullptr) {
+    context_.health().degraded(unusable());
     return;
   }
   mount_known_ = c.mount_known();
@@ -107,13 +106,19 @@ void TrackDetectorService::calibrated(const msg::CameraCalibration& c) {
                       camera.height_px, mount.height_m, core::deg_from_rad(mount.pitch_rad));
 }
 
+std::string TrackDetectorService::unusable() const {
+  if (why_unusable_ == nullptr)
+    return "no camera_calibration for camera " + config_.camera + " yet: no rails can be found";
+  return "calibration unusable: " + std::string(why_unusable_) + " (camera " + config_.camera +
+         "); run railfix calibrate mount";
+}
+
 void TrackDetectorService::pictured(const msg::CameraFrame& frame) {
   context_.health().input();
   if (last_seq_ != 0 && frame.seq() > last_seq_ + 1) context_.health().dropped(frame.seq() - last_seq_ - 1);
   last_seq_ = frame.seq();
   if (!detector_) {
-    context_.health().degraded("no usable camera_calibration for camera " + config_.camera +
-                               " yet: no rails can be found");
+    context_.health().degraded(unusable());
   } else if (static_cast<int>(frame.width_px()) != detector_->camera().width_px ||
              static_cast<int>(frame.height_px()) != detector_->camera().height_px) {
     context_.health().degraded("pictures of camera " + config_.camera +
@@ -135,7 +140,10 @@ void TrackDetectorService::detect(const msg::CameraFrame& frame) {
   }
   const double factor = messaging::sigma_factor(frame.health());
   observation.covariance *= factor * factor;
-  if (observation.seen()) watch_->add(observation.shape, core::seconds(frame.stamp_ns() - last_stamp_ns_));
+  if (observation.seen()) {
+    watch_->add(observation.shape, std::sqrt(observation.covariance(5, 5)),
+                core::seconds(frame.stamp_ns() - last_stamp_ns_));
+  }
   last_stamp_ns_ = frame.stamp_ns();
   if (context_.in_charge()) publish(observation, frame);
   if (observation.seen()) find_landmarks(grey, observation, frame);

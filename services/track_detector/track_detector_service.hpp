@@ -20,6 +20,7 @@ class TrackDetectorService {
  private:
   void calibrated(const msg::CameraCalibration& calibration);
   void restart();
+  [[nodiscard]] std::string unusable() const;
   void pictured(const msg::CameraFrame& frame);
   void detect(const msg::CameraFrame& frame);
   void publish(const TrackObservation& observation, const msg::CameraFrame& frame);
@@ -35,6 +36,7 @@ class TrackDetectorService {
   std::unique_ptr<MountWatch> watch_;
   std::unique_ptr<LandmarkFinder> finder_;
   std::optional<msg::CameraCalibration> calibration_;
+  const char* why_unusable_ = nullptr;  // the calibration; null while there is none
   TrackObservation observation_;
   bool mount_known_ = false;
   uint64_t last_seq_ = 0;

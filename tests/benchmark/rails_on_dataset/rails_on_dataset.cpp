@@ -209,7 +209,8 @@ void measure_sequence(const std::string& sequence, const Options& wanted) {
     statistics.milliseconds.push_back(1e3 * static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC);
     ++statistics.frames;
     if (first_ns == 0) first_ns = last_ns = picture->stamp_ns;
-    if (observation.seen()) watch.add(observation.shape, core::seconds(picture->stamp_ns - last_ns));
+    if (observation.seen())
+      watch.add(observation.shape, std::sqrt(observation.covariance(5, 5)), core::seconds(picture->stamp_ns - last_ns));
     last_ns = picture->stamp_ns;
     if (drift.empty() && watch.drifted()) {
       drift = watch.what_drifted();

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "core/random.hpp"
 #include "geometry/camera.hpp"
@@ -30,6 +31,18 @@ inline double covered(double y_m, double inner_m, double head_m, double blur_m) 
   return std::clamp((high - low) / blur_m, 0.0, 1.0);
 }
 
+/// Where a pixel sees the ground, which is hollow or humped as the track is; nothing above its horizon.
+inline std::optional<Eigen::Vector2d> on_ground(const geometry::View& view, const TrackShape& shape,
+                                                const Eigen::Vector2d& pixel) {
+  const Eigen::Vector3d ray = view.ray(pixel);
+  const double height_m = view.pose().height_m;
+  const double depression = -ray.z() / ray.x();
+  const double square = depression * depression + 2 * shape.vertical_curvature_per_m * height_m;
+  if (ray.x() <= 0 || square <= 0 || depression + std::sqrt(square) <= 0) return std::nullopt;
+  const double ahead_m = 2 * height_m / (depression + std::sqrt(square));
+  return Eigen::Vector2d(ahead_m, view.pose().lateral_m + ahead_m * ray.y() / ray.x());
+}
+
 inline cv::Mat render(const Scene& scene, const geometry::Intrinsics& camera = kCab, uint64_t seed = 1) {
   constexpr double kHeadM = 0.07;
   const geometry::View view(camera, scene.shape.camera);
@@ -37,7 +50,7 @@ inline cv::Mat render(const Scene& scene, const geometry::Intrinsics& camera = k
   cv::Mat picture(camera.height_px, camera.width_px, CV_8UC1);
   for (int v = 0; v < picture.rows; ++v) {
     for (int u = 0; u < picture.cols; ++u) {
-      const auto ground = view.on_plane({u, v}, 0);
+      const auto ground = on_ground(view, scene.shape, {u, v});
       double grey = 150;
       if (ground && ground->x() < 400) {
         const double x = ground->x();
