@@ -12,6 +12,7 @@
 
 #include "geometry/camera.hpp"
 #include "odometry/motion_filter.hpp"
+#include "odometry/recent_places.hpp"
 #include "odometry/shift_search.hpp"
 #include "odometry/standstill.hpp"
 #include "odometry/texture_alignment.hpp"
@@ -83,8 +84,9 @@ class TrainMouse {
   TrainMouse(const geometry::Intrinsics& camera, const TrainMouseOptions& options);
 
   /// Pictures in the order of their stamps; one that is not newer than the last is answered as invalid and left out.
+  /// A measured pose with a number that is none is no measured pose; without a pose at all the picture is left out.
   /// When it is older by more than a second the clock was set back: measuring begins anew, the distance goes on.
-  MouseStep process(const MousePicture& picture);
+  MouseStep process(const MousePicture& given);
 
  private:
   struct Seen {  // one picture, ready to be compared
@@ -116,6 +118,8 @@ class TrainMouse {
   [[nodiscard]] Rough find_roughly(bool full_band, double predicted_m, double band_m);
   bool align(const Rough& rough, MouseStep& step);
   [[nodiscard]] PoseTie tie(double along_m) const;
+  [[nodiscard]] double supported_speed_mps() const;
+  [[nodiscard]] bool shown_again() const;
   void accept(MouseStep& step);
   [[nodiscard]] double scale_sigma() const;
   [[nodiscard]] double turn_of_camera() const;
@@ -125,6 +129,7 @@ class TrainMouse {
   void renew_reference(const MouseStep& step, double dt_s);
   double bridge(double speed_after_mps);
   void give_up(MouseStep& step);
+  void begin_places();
   void smooth_curves(const MousePicture& picture);
   void begin_anew();
 
@@ -137,6 +142,7 @@ class TrainMouse {
   Seen now_;
   Motion motion_;
   Standstill standstill_;
+  RecentPlaces recent_;  // since the last start anew
   std::vector<PatchMotion> votes_;
   std::optional<Reference> reference_;
   double curvature_per_m_ = 0;
