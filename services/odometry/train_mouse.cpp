@@ -21,6 +21,7 @@ constexpr double kStandingStepM = 0.05;         // less is standstill, which ...
 constexpr double kStandingShare = 0.8;          // ... nearly all the ground in sight must show (lettering: up to 0.7)
 constexpr double kLongestReferenceShare = 0.6;  // of the sheet that may have gone out of sight
 constexpr double kSpeedGain = 0.5;
+constexpr double kSupportS = 2;  // of acceleration beside the last second's mean
 constexpr int64_t kSpeedOverNs = core::kNsPerSecond / 10;
 // A repeated picture: nothing moves though the train must have gone so far at least, of which ...
 constexpr double kRepeatLeastM = 0.02;
@@ -30,9 +31,7 @@ constexpr double kBouncePerM = 0.02;      // ... the springs on the way, ...
 constexpr double kSettlingMps = 1e-4;     // ... people getting in
 constexpr double kVerticalChangePerM2 = 1e-5;
 constexpr double kVerticalChangeM = 0.2;
-constexpr double kReliefSigmaM = 0.008;    // mean of the ground in sight against the sheet; tuned on simulated relief
-constexpr double kUnseenPitchShare = 0.4;  // of the mount's pitch sigma that the ground does not take out; tuned alike
-constexpr double kFadedScore = 0.6;        // at rest: the light has changed since the reference
+constexpr double kFadedScore = 0.6;  // at rest: the light has changed since the reference
 constexpr int64_t kShortestRestNs = 2 * core::kNsPerSecond;
 constexpr int64_t kClockSetBackNs = core::kNsPerSecond;  // no picture is as late as that
 
@@ -68,6 +67,7 @@ bool TrainMouse::look(const MousePicture& picture) {
   now_.prior = {};
   now_.prior.trust = picture.trust;
   now_.pose_measured = picture.pose_measured;
+  now_.exposure_s = picture.exposure_s;
   if (!picture.pose_measured) {
     now_.prior.trust = PoseTrust::independent(options_.mount_pitch_sigma_rad, options_.mount_height_sigma_m);
   }
@@ -188,7 +188,8 @@ bool TrainMouse::align(const Rough& rough, MouseStep& step) {
 double TrainMouse::supported_speed_mps() const {
   if (recent_.count() < 2) return speed_mps_;
   const double mean_mps = recent_.speed_mps(core::kNsPerSecond);
-  return std::clamp(speed_mps_, mean_mps - options_.max_acceleration_mps2, mean_mps + options_.max_acceleration_mps2);
+  const double change_mps = kSupportS * options_.max_acceleration_mps2;
+  return std::clamp(speed_mps_, mean_mps - change_mps, mean_mps + change_mps);
 }
 
 // A picture that is shown again, but not bit for bit (film coded anew, a lost packet concealed), looks like standstill.
@@ -230,50 +231,6 @@ void TrainMouse::accept(MouseStep& step) {
   renew_reference(step, dt_s);
 }
 
-// Errors that all patches and many steps have in common, which the least squares takes for independent: the mean relief
-// of the ground in sight and, where rails are not seen, the slow pitching of the body about the mount's pose.
-double TrainMouse::scale_sigma() const {
-  const double height_m = now_.pose.height_m();
-  const double relief = kReliefSigmaM / height_m;
-  if (now_.pose_measured && reference_->seen.pose_measured) return relief;
-  return std::hypot(relief, 2.0 * patches_ahead_m() / height_m * kUnseenPitchShare * options_.mount_pitch_sigma_rad);
-}
-
-// The sheets follow the rails that are seen, metres ahead and perhaps those of another leg; the camera turns with the
-// car body, whatever the sheets follow. What the two sheets make of it is taken off again: their yaw at the foot and
-// their curve over the step.
-double TrainMouse::turn_of_camera() const {
-  const auto& then = reference_->seen.pose;
-  return motion_.turn_rad + now_.pose.camera.yaw_rad - then.camera.yaw_rad + then.curvature_per_m * motion_.along_m;
-}
-
-double TrainMouse::patches_ahead_m() const {
-  double ahead_m = 0;
-  for (const PatchMotion& patch : votes_) ahead_m += patch.place_m.x() / static_cast<double>(votes_.size());
-  return ahead_m;
-}
-
-void TrainMouse::fill(MouseStep& step, double distance_m) const {
-  // With what this picture says of the reference's own distance, so that steps add up to the distance.
-  step.step_m = distance_m - reference_->distance_m;
-  step.lateral_m = motion_.lateral_m + 0.5 * now_.pose.curvature_per_m * motion_.along_m * motion_.along_m;
-  step.yaw_rad = turn_of_camera();
-  // What standstill holds back is an error of the step that is known to be there.
-  step.step_sigma_m = std::hypot(motion_.along_sigma_m, scale_sigma() * motion_.along_m, step.step_m - motion_.along_m);
-  step.yaw_sigma_rad = motion_.turn_sigma_rad;
-  const double since_reference_s = core::seconds(now_.stamp_ns - reference_->seen.stamp_ns);
-  step.lateral_speed_mps = step.lateral_m / since_reference_s;
-  step.yaw_rate_rps = step.yaw_rad / since_reference_s;
-  step.speed_mps = speed_mps_;
-  step.agreement = motion_.agreement;
-  step.pitch_bias_rad = motion_.now.mean(PoseErrors::kPitchBias);
-  step.ballast_depth_m = motion_.now.mean(PoseErrors::kBallastDepth);
-  step.mode = !confirmed_                                   ? MouseMode::search
-              : reference_->seen.stamp_ns == last_stamp_ns_ ? MouseMode::track
-                                                            : MouseMode::keyframe;
-  step.valid = confirmed_;
-}
-
 // The reference stays while the next picture will still be near it; at rest until the light has changed.
 void TrainMouse::renew_reference(const MouseStep& step, double dt_s) {
   const double next_m = std::abs(motion_.along_m + speed_mps_ * dt_s);
@@ -294,7 +251,7 @@ double TrainMouse::bridge(double speed_after_mps) {
   if (measured_stamp_ns_ == 0) return 0;
   const double gap_s = core::seconds(restart_stamp_ns_ - measured_stamp_ns_);
   if (gap_s > options_.bridge_s) return 0;
-  const double gain_mps = options_.max_acceleration_mps2 * core::seconds(now_.stamp_ns - measured_stamp_ns_);
+  const double gain_mps = options_.max_acceleration_mps2 * (1.0 + core::seconds(now_.stamp_ns - measured_stamp_ns_));
   const double after_mps =
       std::clamp(speed_after_mps, speed_before_gap_mps_ - gain_mps, speed_before_gap_mps_ + gain_mps);
   const double bridge_m = 0.5 * (speed_before_gap_mps_ + after_mps) * gap_s;

@@ -50,6 +50,7 @@ struct MousePicture {
   PoseTrust trust;  // of a measured pose
   double curvature_per_m = 0;
   double vertical_curvature_per_m = 0;
+  double exposure_s = 0;            // 0 = not known
   std::optional<double> speed_mps;  // from elsewhere, only to find the first match
 };
 
@@ -96,6 +97,7 @@ class TrainMouse {
     CoarseView coarse;
     PosePrior prior;
     bool pose_measured = false;
+    double exposure_s = 0;
   };
   struct Reference {
     explicit Reference(const TextureReference::Options& options) : texture(options) {}
@@ -122,6 +124,7 @@ class TrainMouse {
   [[nodiscard]] bool shown_again() const;
   void accept(MouseStep& step);
   [[nodiscard]] double scale_sigma() const;
+  [[nodiscard]] double blur_sigma_m() const;
   [[nodiscard]] double turn_of_camera() const;
   /// Of the foot, in the reference picture.
   [[nodiscard]] double patches_ahead_m() const;

@@ -1,6 +1,10 @@
 // The measuring tools: each explains itself, and says what is wrong with its arguments.
 #include <gmock/gmock.h>
 
+#include <fstream>
+#include <iterator>
+#include <sstream>
+
 #include "support/program.hpp"
 
 namespace railfix::measuring_tools_test {
@@ -31,6 +35,23 @@ TEST(MeasuringTools, SayWhatIsWrong) {
     EXPECT_EQ(outcome.exit_code, 2) << arguments[0] << outcome.out << outcome.err;
     EXPECT_NE(outcome.err, "") << arguments[0];
   }
+}
+
+TEST(MeasuringTools, OptionsGoOverScenarioFiles) {
+  const auto measured = [](const std::string& scenario_time_s) {
+    const auto file = testing::TempDir() + "railfix_scenario_" + scenario_time_s + ".yaml";
+    std::ofstream(file) << "simulator:\n  exposure: {time_s: " << scenario_time_s << "}\n";
+    std::istringstream words(
+        "railfix-measure-odometry --simulate 1:100 --line long --length-m 2 --speed-kmh 36 --accelerate 3 --dwell-s "
+        "0.1 "
+        "--rate-hz 10 --steps --exposure-s 0.001 --scenario");
+    std::vector<std::string> arguments{std::istream_iterator<std::string>(words), {}};
+    arguments.push_back(file);
+    const auto outcome = test::run_program(arguments, kPatienceS);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.out.substr(0, outcome.out.find("processor time"));
+  };
+  EXPECT_EQ(measured("0.05"), measured("0.001"));
 }
 
 TEST(MeasuringTools, RefuseNumbersThatMeanNothing) {

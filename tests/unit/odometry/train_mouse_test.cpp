@@ -33,6 +33,7 @@ class Ride {
   std::optional<geometry::CameraPose> pose_used;
   PoseTrust trust = PoseTrust::independent(0.0003, 0.002);
   SyntheticGround::Light light;
+  double exposure_s = 0;             // as it is told; the pictures are sharp
   double wrong_curvature_per_m = 0;  // added to what is told
 
  private:
@@ -43,6 +44,7 @@ class Ride {
     picture.stamp_ns = 1'700'000'000'000'000'000 + core::to_ns(time_s);
     picture.pose = pose_used.value_or(shaken);
     picture.pose_measured = true;
+    picture.exposure_s = exposure_s;
     picture.trust = trust;
     picture.curvature_per_m = options_.curvature_per_m + wrong_curvature_per_m;
     picture.vertical_curvature_per_m = options_.vertical_curvature_per_m;
@@ -471,6 +473,20 @@ TEST(TrainMouse, SigmaIsHonest) {
   ASSERT_GT(count, 50);
   EXPECT_LT(std::sqrt(sum / count), 2.0);
   EXPECT_GT(std::sqrt(sum / count), 0.15);
+}
+
+TEST(TrainMouse, SigmaHoldsMotionBlur) {
+  const auto sigma_m = [](double exposure_s) {
+    Ride ride;
+    ride.exposure_s = exposure_s;
+    MouseStep step;
+    for (int i = 0; i <= 8; ++i) step = ride.at(i / kRate, 24 / kRate * i);
+    EXPECT_TRUE(step.valid);
+    return step.step_sigma_m;
+  };
+  const double sharp_m = sigma_m(0);
+  EXPECT_NEAR(sigma_m(0.002), sharp_m, 0.05 * sharp_m) << "by day";
+  EXPECT_GT(sigma_m(0.02), 0.012) << "at night";
 }
 
 TEST(TrainMouse, WrongSizeIsRefused) {
