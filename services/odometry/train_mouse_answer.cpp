@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kReliefSigmaM = 0.008;    // mean of the ground in sight against the sheet; tuned on simulated relief
 constexpr double kUnseenPitchShare = 0.4;  // of the mount's pitch sigma that the ground does not take out; tuned alike
-constexpr double kBlurSigmaPerM = 0.06;    // of the square of the way during the exposure; tuned on simulated nights
+// Of the square of the way during the exposure, by the share of the patches that is noise; tuned on simulated nights.
+constexpr double kBlurSigmaPerM = 0.2;
 
 }  // namespace
 
@@ -27,7 +28,9 @@ double TrainMouse::scale_sigma() const {
 // squares takes for the ground's.
 double TrainMouse::blur_sigma_m() const {
   const double blur_m = speed_mps_ * std::max(0.0, now_.exposure_s);
-  return kBlurSigmaPerM * blur_m * blur_m;
+  double noise = 0;
+  for (const PatchMotion& patch : votes_) noise += (1 - patch.correlation) / static_cast<double>(votes_.size());
+  return kBlurSigmaPerM * noise * blur_m * blur_m;
 }
 
 // The sheets follow the rails that are seen, metres ahead and perhaps those of another leg; the camera turns with the
