@@ -66,7 +66,7 @@ struct FrameGrabberConfig {
       f.number("saturated_share", health.saturated_share, {0.01, 1}, "",
                "Saturated: this share of the pixels is 250 or brighter.");
       f.integer("frozen_after_pictures", health.frozen_after_pictures, {1, 10000}, "pictures",
-                "Frozen: so many pictures in a row are equal, in every pixel, to one of the 16 before.");
+                "Frozen: so many pictures in a row equal one of the 16 before, or are the last one coded anew.");
       f.number("covered_share", health.covered_share, {0.05, 1}, "",
                "Covered: this share of the track's part of the picture shows nothing, or stands still while the rest "
                "of it moves.");

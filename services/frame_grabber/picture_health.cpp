@@ -28,6 +28,14 @@ constexpr int64_t kReferenceNs = core::kNsPerSecond;
 constexpr int kStillComparisons = 4;
 constexpr double kMovingShare = 0.3;                         // of the track's tiles, for the others to be called still
 constexpr int64_t kClockSetBackNs = 2 * core::kNsPerSecond;  // no picture is held up so long on its way
+// A picture that is shown again though not to the last bit. Two pictures of one place differ by the camera's noise, a
+// tenth of what motion changes; a picture and the same coded anew by less. The last pictures before a stop come closer
+// and closer.
+constexpr double kMovesPictureShare = 0.4;              // change over structure
+constexpr double kRepeatShare = 0.05;                   // of the change before
+constexpr int kFewestMoves = 5;                         // a knock on a standing train is shorter
+constexpr int64_t kRepeatsNs = 5 * core::kNsPerSecond;  // later it may stand
+constexpr int64_t kNextNs = 70'000'000;                 // pictures farther apart may show a stop between them
 // The part of the track that is watched.
 constexpr double kNearM = 3;
 constexpr double kFarM = 25;
@@ -69,9 +77,10 @@ void PictureHealth::watch_track(const geometry::Intrinsics& camera, const geomet
 
 uint32_t PictureHealth::judge(int64_t stamp_ns, const cv::Mat& grey) {
   if (!track_) track_ = usual_track();
+  std::swap(now_, last_);
   now_.measure(grey);
   uint32_t health = exposure();
-  if (repeated(grey)) health |= kFrozen;
+  if (repeated(stamp_ns, grey)) health |= kFrozen;
   if (newest_ns_ && stamp_ns <= *newest_ns_) health |= kOutOfOrder;
   const bool clock_set_back = newest_ns_ && *newest_ns_ - stamp_ns > kClockSetBackNs;
   newest_ns_ = clock_set_back ? stamp_ns : std::max(stamp_ns, newest_ns_.value_or(stamp_ns));
@@ -97,14 +106,48 @@ uint32_t PictureHealth::exposure() const {
   return health;
 }
 
-/// Also a driver that gives its last few buffers again and again.
-bool PictureHealth::repeated(const cv::Mat& grey) {
+bool PictureHealth::repeated(int64_t stamp_ns, const cv::Mat& grey) {
+  const bool equal = seen_before(grey);
+  const bool alike = shown_again(stamp_ns);
+  repeats_ = equal || alike ? repeats_ + 1 : 0;
+  return repeats_ >= config_.frozen_after_pictures;
+}
+
+/// Also by a driver that gives its last few buffers again and again.
+bool PictureHealth::seen_before(const cv::Mat& grey) {
   const uint64_t own = fingerprint(grey);
   const auto known = fingerprints_.begin() + static_cast<std::ptrdiff_t>(std::min(pictures_, fingerprints_.size()));
-  const bool seen_before = std::find(fingerprints_.begin(), known, own) != known;
-  repeats_ = seen_before ? repeats_ + 1 : 0;
-  if (!seen_before) fingerprints_[pictures_++ % fingerprints_.size()] = own;
-  return repeats_ >= config_.frozen_after_pictures;
+  const bool seen = std::find(fingerprints_.begin(), known, own) != known;
+  if (!seen) fingerprints_[pictures_++ % fingerprints_.size()] = own;
+  return seen;
+}
+
+/// From one picture to the next the track stands still to less than the camera's noise, though it ran by before. Where
+/// a film has been standing for long nothing is said.
+bool PictureHealth::shown_again(int64_t stamp_ns) {
+  const int64_t since_last_ns = last_ns_ ? stamp_ns - *last_ns_ : 0;
+  last_ns_ = stamp_ns;
+  if (since_last_ns <= 0 || since_last_ns > kNextNs || last_.window_means.size() != now_.window_means.size()) {
+    moves_ = 0;
+    return false;
+  }
+  const auto changes = difference(now_, last_);
+  double change = 0;
+  double structure = 0;
+  for (size_t i = 0; i < kTiles; ++i) {
+    if (!track_->test(i)) continue;
+    change += changes[i] - std::abs(now_.tiles[i].grey - last_.tiles[i].grey);  // light is no motion
+    structure += std::max(now_.tiles[i].structure_grey, last_.tiles[i].structure_grey);
+  }
+  if (moves_ == 0 || change >= kRepeatShare * moved_) {
+    alike_since_ns_.reset();
+    moved_ = change;
+    moves_ = change > kMovesPictureShare * structure ? moves_ + 1 : 0;
+    return false;
+  }
+  if (!alike_since_ns_) alike_since_ns_ = stamp_ns;
+  if (stamp_ns - *alike_since_ns_ > kRepeatsNs) moves_ = 0;
+  return moves_ >= kFewestMoves;
 }
 
 void PictureHealth::find_cover(int64_t stamp_ns) {

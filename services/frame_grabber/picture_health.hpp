@@ -51,7 +51,9 @@ class PictureHealth {
     std::optional<int64_t> since_ns_;
   };
   uint32_t exposure() const;
-  bool repeated(const cv::Mat& grey);
+  bool repeated(int64_t stamp_ns, const cv::Mat& grey);
+  bool seen_before(const cv::Mat& grey);
+  bool shown_again(int64_t stamp_ns);
   void find_cover(int64_t stamp_ns);
   void compare_with_reference();
   void measure_sharpness();
@@ -59,7 +61,12 @@ class PictureHealth {
   PictureHealthConfig config_;
   std::optional<TileMask> track_;
   PictureTiles now_;
-  PictureTiles reference_;  // of about a second ago
+  PictureTiles last_;  // the picture before
+  std::optional<int64_t> last_ns_;
+  int moves_ = 0;                          // pictures in a row that show motion, repeats left out
+  double moved_ = 0;                       // change of the last one of them
+  std::optional<int64_t> alike_since_ns_;  // the present row of repeats
+  PictureTiles reference_;                 // of about a second ago
   std::optional<int64_t> reference_ns_;
   std::array<int, kTiles> still_{};  // times in a row that a tile stood still while the track moved
   std::array<uint64_t, 16> fingerprints_{};

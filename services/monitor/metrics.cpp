@@ -124,6 +124,9 @@ void add_position(Families& families, const MetricsInput& input) {
   if (!input.seen->state) return;
   const auto& state = *input.seen->state;
   families.gauge("railfix_position_age_seconds", "Since the last train_state.", input.seen->state_age_s);
+  families.gauge("railfix_position_behind_seconds",
+                 "How old the last train_state was already when it came, by its stamp; NaN for played data.",
+                 input.seen->state_behind_s.value_or(kNaN));
   families.gauge("railfix_position_over_meters", "The train may be this far behind its estimate.", state.over_m());
   families.gauge("railfix_position_under_meters", "The train may be this far before its estimate.", state.under_m());
   families.gauge("railfix_position_since_reference_meters", "Travelled since the last landmark or fix.",

@@ -289,6 +289,12 @@ bool MonitorService::played_data_has_ended() const {
   return core::seconds(newest_ns - clock_.arrived_ns) < kAbsentS;
 }
 
+// Played data keeps the stamps that it was recorded with; what comes after its end is live again.
+bool MonitorService::is_live() const {
+  if (recent(player_)) return false;
+  return !clock_.sample || (clock_.sample->ended() != 0 && !played_data_has_ended());
+}
+
 TrainSeen MonitorService::train_seen() {
   TrainSeen train;
   train.now_ns = core::monotonic_ns();
@@ -302,6 +308,7 @@ TrainSeen MonitorService::train_seen() {
   }
   train.state = state_.sample;
   train.state_age_s = state_.age_s(train.now_ns);
+  if (state_.sample && is_live()) train.state_behind_s = state_.behind_s();
   if (recent(recorder_)) train.recorder = recorder_.sample;
   if (recent(gnss_)) train.gnss = gnss_.sample;
   train.played = recent(player_);

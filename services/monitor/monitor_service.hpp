@@ -42,6 +42,7 @@ class MonitorService {
 
   // monitor_service.cpp: samples, and what is wrong
   [[nodiscard]] bool played_data_has_ended() const;
+  [[nodiscard]] bool is_live() const;
   void start_timers();
   void beat();
   void restart();

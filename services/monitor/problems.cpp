@@ -15,6 +15,7 @@ namespace {
 constexpr double kStartS = 10;
 constexpr double kSilentS = 2;
 constexpr double kSilentGaps = 8;
+constexpr double kBehindS = 1;
 constexpr double kSharedMemoryLowMb = 64;
 // So the recorder begins its reason while it loses samples.
 constexpr std::string_view kRecorderLoses = "samples are lost";
@@ -83,6 +84,14 @@ void judge_topics(const TrainSeen& train, Problems& problems) {
 
 void judge_position(const TrainSeen& train, Problems& problems) {
   if (!train.state || train.data_stands) return;
+  if (train.state_behind_s && *train.state_behind_s > kBehindS) {
+    problems.push_back(
+        {"behind", Level::error,
+         fmt::format("The position that comes now is {:.1f} s old: fusion is late, or the computers' clocks differ",
+                     *train.state_behind_s),
+         "See the processor load of fusion's computer, and that all computers get their time from one source (NTP, "
+         "PTP)."});
+  }
   const auto& state = *train.state;
   if (state.track_known() == 0) {
     problems.push_back(

@@ -41,6 +41,7 @@ struct TrainSeen {
   std::vector<Topic> topics;  // those that are listened to
   std::optional<msg::TrainState> state;
   double state_age_s = 0;
+  std::optional<double> state_behind_s;  // its stamp behind the wall clock when it came; live data only
   std::optional<msg::RecorderStatus> recorder;
   std::optional<msg::GnssFix> gnss;
   bool data_stands = false;           // played data has ended or is paused: silence is right

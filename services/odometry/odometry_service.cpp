@@ -100,6 +100,7 @@ void OdometryService::pictured(const msg::CameraFrame& frame) {
   waiting.grabbed_ns = frame.grabbed_ns();
   waiting.frame_seq = frame.seq();
   waiting.health = frame.health();
+  waiting.exposure_s = frame.exposure_s();
   waiting.until_ns =
       core::monotonic_ns() + (context_.common().lock_step ? kLockStepWaitNs : core::to_ns(config_.max_wait_ms * 1e-3));
   waiting.grey = spare();
@@ -139,6 +140,7 @@ void OdometryService::measure(const Waiting& waiting, const msg::TrackView* view
     MousePicture picture;
     picture.grey = waiting.grey;
     picture.stamp_ns = waiting.stamp_ns;
+    picture.exposure_s = waiting.exposure_s;
     take_pose(waiting, view, picture);
     if (messaging::why_useless(waiting.health) != nullptr) {
       last_step_.stamp_ns = waiting.stamp_ns;

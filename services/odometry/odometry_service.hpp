@@ -21,6 +21,7 @@ class OdometryService {
     int64_t grabbed_ns = 0;
     uint64_t frame_seq = 0;
     uint32_t health = 0;
+    float exposure_s = 0;  // 0 = not known
     int64_t until_ns = 0;  // monotonic
     cv::Mat grey;
   };

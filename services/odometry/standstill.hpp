@@ -5,16 +5,16 @@
 // the band it is reported as measured, with all that was held back.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <vector>
+
+#include "odometry/recent_places.hpp"
 
 namespace railfix::odometry {
 
 class Standstill {
  public:
   /// hold_m: motion at rest that is not counted until it exceeds it.
-  explicit Standstill(double hold_m) : hold_m_(hold_m) { recent_.reserve(kMostRecent); }
+  explicit Standstill(double hold_m) : hold_m_(hold_m) {}
 
   /// Measured distance in the order of stamps -> distance to report.
   double report(int64_t stamp_ns, double measured_m);
@@ -23,25 +23,14 @@ class Standstill {
   [[nodiscard]] double recent_speed_mps() const;
 
  private:
-  static constexpr size_t kMostRecent = 128;
-  struct Place {
-    int64_t stamp_ns;
-    double measured_m;
-  };
-  struct Spread {
-    double mean = 0, rms = 0, range = 0;
-  };
-  void remember(int64_t stamp_ns, double measured_m);
-  [[nodiscard]] size_t since(int64_t age_ns) const;  // index of the first place that is not older
-  [[nodiscard]] Spread spread(size_t first, size_t end) const;
   [[nodiscard]] bool left(double measured_m);
-  [[nodiscard]] bool settled();
+  [[nodiscard]] bool settled(double measured_m);
 
   double hold_m_;
   bool resting_ = true;  // a run begins at rest until it is seen to move
   double anchor_m_ = 0;
-  int outside_ = 0;            // pictures in a row
-  std::vector<Place> recent_;  // a second of them
+  int outside_ = 0;  // pictures in a row
+  RecentPlaces recent_;
 };
 
 }  // namespace railfix::odometry

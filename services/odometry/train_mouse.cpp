@@ -21,16 +21,29 @@ constexpr double kStandingStepM = 0.05;         // less is standstill, which ...
 constexpr double kStandingShare = 0.8;          // ... nearly all the ground in sight must show (lettering: up to 0.7)
 constexpr double kLongestReferenceShare = 0.6;  // of the sheet that may have gone out of sight
 constexpr double kSpeedGain = 0.5;
+constexpr double kSupportS = 2;  // of acceleration beside the last second's mean
+constexpr int64_t kSpeedOverNs = core::kNsPerSecond / 10;
+// A repeated picture: nothing moves though the train must have gone so far at least, of which ...
+constexpr double kRepeatLeastM = 0.02;
+constexpr double kRepeatShare = 0.25;     // ... less than this is nothing
 constexpr double kHeightShakeM = 0.0015;  // of the camera between two pictures: motors, ...
 constexpr double kBouncePerM = 0.02;      // ... the springs on the way, ...
 constexpr double kSettlingMps = 1e-4;     // ... people getting in
 constexpr double kVerticalChangePerM2 = 1e-5;
 constexpr double kVerticalChangeM = 0.2;
-constexpr double kReliefSigmaM = 0.008;    // mean of the ground in sight against the sheet; tuned on simulated relief
-constexpr double kUnseenPitchShare = 0.4;  // of the mount's pitch sigma that the ground does not take out; tuned alike
-constexpr double kFadedScore = 0.6;        // at rest: the light has changed since the reference
+constexpr double kFadedScore = 0.6;  // at rest: the light has changed since the reference
 constexpr int64_t kShortestRestNs = 2 * core::kNsPerSecond;
 constexpr int64_t kClockSetBackNs = core::kNsPerSecond;  // no picture is as late as that
+
+bool finite(const geometry::CameraPose& pose) {
+  return std::isfinite(pose.roll_rad + pose.pitch_rad + pose.yaw_rad + pose.lateral_m + pose.height_m);
+}
+
+// With one number that is none nothing of it is believed.
+bool measured_wholly(const MousePicture& picture) {
+  return finite(picture.pose) && picture.trust.covariance.allFinite() &&
+         std::isfinite(picture.curvature_per_m + picture.vertical_curvature_per_m);
+}
 
 }  // namespace
 
@@ -54,6 +67,7 @@ bool TrainMouse::look(const MousePicture& picture) {
   now_.prior = {};
   now_.prior.trust = picture.trust;
   now_.pose_measured = picture.pose_measured;
+  now_.exposure_s = picture.exposure_s;
   if (!picture.pose_measured) {
     now_.prior.trust = PoseTrust::independent(options_.mount_pitch_sigma_rad, options_.mount_height_sigma_m);
   }
@@ -170,14 +184,40 @@ bool TrainMouse::align(const Rough& rough, MouseStep& step) {
   return std::abs(motion_.along_m) >= kStandingStepM || step.matched >= kStandingShare;
 }
 
+// As it is, but no more than the last second's mean and the train's acceleration allow: stamps may be wrong.
+double TrainMouse::supported_speed_mps() const {
+  if (recent_.count() < 2) return speed_mps_;
+  const double mean_mps = recent_.speed_mps(core::kNsPerSecond);
+  const double change_mps = kSupportS * options_.max_acceleration_mps2;
+  return std::clamp(speed_mps_, mean_mps - change_mps, mean_mps + change_mps);
+}
+
+// A picture that is shown again, but not bit for bit (film coded anew, a lost packet concealed), looks like standstill.
+// No train stops so soon.
+bool TrainMouse::shown_again() const {
+  if (measured_stamp_ns_ == 0) return false;
+  // The mean lags behind a train that brakes.
+  const double before_mps = confirmed_ ? std::min(std::abs(supported_speed_mps()), std::abs(recent_.speed_mps(0)))
+                                       : std::abs(speed_before_gap_mps_);
+  const double least_mps =
+      before_mps - options_.max_acceleration_mps2 * core::seconds(now_.stamp_ns - measured_stamp_ns_);
+  const double least_m = least_mps * core::seconds(now_.stamp_ns - tentative_stamp_ns_);
+  const double moved_m = reference_->measured_m + motion_.now.mean(PoseErrors::kDistance) - tentative_distance_m_;
+  return least_m > kRepeatLeastM && std::abs(moved_m) < kRepeatShare * least_m;
+}
+
 void TrainMouse::accept(MouseStep& step) {
   const double dt_s = core::seconds(now_.stamp_ns - tentative_stamp_ns_);
   double measured_m = reference_->measured_m + motion_.now.mean(PoseErrors::kDistance);
-  const double measured_mps = (measured_m - tentative_distance_m_) / dt_s;
+  recent_.remember(now_.stamp_ns, measured_m);
+  const double measured_mps =
+      std::clamp(recent_.speed_mps(kSpeedOverNs), -options_.max_speed_mps, options_.max_speed_mps);
   speed_mps_ = speed_known_ ? speed_mps_ + kSpeedGain * (measured_mps - speed_mps_) : measured_mps;
   if (!confirmed_ && speed_known_) {
     confirmed_ = true;
-    measured_m += bridge(measured_mps);
+    const double bridge_m = bridge(measured_mps);
+    measured_m += bridge_m;
+    recent_.shift(bridge_m);
   }
   speed_known_ = true;
   tentative_distance_m_ = measured_m;
@@ -189,50 +229,6 @@ void TrainMouse::accept(MouseStep& step) {
   }
   fill(step, confirmed_ ? distance_m_ : measured_m);
   renew_reference(step, dt_s);
-}
-
-// Errors that all patches and many steps have in common, which the least squares takes for independent: the mean relief
-// of the ground in sight and, where rails are not seen, the slow pitching of the body about the mount's pose.
-double TrainMouse::scale_sigma() const {
-  const double height_m = now_.pose.height_m();
-  const double relief = kReliefSigmaM / height_m;
-  if (now_.pose_measured && reference_->seen.pose_measured) return relief;
-  return std::hypot(relief, 2.0 * patches_ahead_m() / height_m * kUnseenPitchShare * options_.mount_pitch_sigma_rad);
-}
-
-// The sheets follow the rails that are seen, metres ahead and perhaps those of another leg; the camera turns with the
-// car body, whatever the sheets follow. What the two sheets make of it is taken off again: their yaw at the foot and
-// their curve over the step.
-double TrainMouse::turn_of_camera() const {
-  const auto& then = reference_->seen.pose;
-  return motion_.turn_rad + now_.pose.camera.yaw_rad - then.camera.yaw_rad + then.curvature_per_m * motion_.along_m;
-}
-
-double TrainMouse::patches_ahead_m() const {
-  double ahead_m = 0;
-  for (const PatchMotion& patch : votes_) ahead_m += patch.place_m.x() / static_cast<double>(votes_.size());
-  return ahead_m;
-}
-
-void TrainMouse::fill(MouseStep& step, double distance_m) const {
-  // With what this picture says of the reference's own distance, so that steps add up to the distance.
-  step.step_m = distance_m - reference_->distance_m;
-  step.lateral_m = motion_.lateral_m + 0.5 * now_.pose.curvature_per_m * motion_.along_m * motion_.along_m;
-  step.yaw_rad = turn_of_camera();
-  // What standstill holds back is an error of the step that is known to be there.
-  step.step_sigma_m = std::hypot(motion_.along_sigma_m, scale_sigma() * motion_.along_m, step.step_m - motion_.along_m);
-  step.yaw_sigma_rad = motion_.turn_sigma_rad;
-  const double since_reference_s = core::seconds(now_.stamp_ns - reference_->seen.stamp_ns);
-  step.lateral_speed_mps = step.lateral_m / since_reference_s;
-  step.yaw_rate_rps = step.yaw_rad / since_reference_s;
-  step.speed_mps = speed_mps_;
-  step.agreement = motion_.agreement;
-  step.pitch_bias_rad = motion_.now.mean(PoseErrors::kPitchBias);
-  step.ballast_depth_m = motion_.now.mean(PoseErrors::kBallastDepth);
-  step.mode = !confirmed_                                   ? MouseMode::search
-              : reference_->seen.stamp_ns == last_stamp_ns_ ? MouseMode::track
-                                                            : MouseMode::keyframe;
-  step.valid = confirmed_;
 }
 
 // The reference stays while the next picture will still be near it; at rest until the light has changed.
@@ -249,12 +245,16 @@ void TrainMouse::renew_reference(const MouseStep& step, double dt_s) {
   reference_->distance_m = confirmed_ ? distance_m_ : tentative_distance_m_;
 }
 
-// Distance over the gap before the present reference, at the mean of the speeds on either side.
+// Distance over the gap before the present reference, at the mean of the speeds on either side; of the one after it
+// no more than the train can have gained.
 double TrainMouse::bridge(double speed_after_mps) {
   if (measured_stamp_ns_ == 0) return 0;
   const double gap_s = core::seconds(restart_stamp_ns_ - measured_stamp_ns_);
   if (gap_s > options_.bridge_s) return 0;
-  const double bridge_m = 0.5 * (speed_before_gap_mps_ + speed_after_mps) * gap_s;
+  const double gain_mps = options_.max_acceleration_mps2 * (1.0 + core::seconds(now_.stamp_ns - measured_stamp_ns_));
+  const double after_mps =
+      std::clamp(speed_after_mps, speed_before_gap_mps_ - gain_mps, speed_before_gap_mps_ + gain_mps);
+  const double bridge_m = 0.5 * (speed_before_gap_mps_ + after_mps) * gap_s;
   reference_->measured_m += bridge_m;
   reference_->distance_m += bridge_m;
   return bridge_m;
@@ -269,7 +269,7 @@ void TrainMouse::give_up(MouseStep& step) {
   step.mode = MouseMode::search;
   if (confirmed_ && !out_of_sight && !too_long) return;
   // Start anew from this picture.
-  if (confirmed_) speed_before_gap_mps_ = speed_mps_;
+  if (confirmed_) speed_before_gap_mps_ = supported_speed_mps();
   restart_stamp_ns_ = now_.stamp_ns;
   speed_known_ = false;
   confirmed_ = false;
@@ -277,6 +277,12 @@ void TrainMouse::give_up(MouseStep& step) {
   reference_->errors = filter_.first(now_.prior);
   reference_->measured_m = reference_->distance_m = tentative_distance_m_ = distance_m_;
   tentative_stamp_ns_ = now_.stamp_ns;
+  begin_places();
+}
+
+void TrainMouse::begin_places() {
+  recent_.forget();
+  recent_.remember(tentative_stamp_ns_, tentative_distance_m_);
 }
 
 // The clock was set back, or a stamp was far ahead of the others: what is known of the motion is of no use.
@@ -289,7 +295,9 @@ void TrainMouse::begin_anew() {
   tentative_distance_m_ = distance_m_;
 }
 
-MouseStep TrainMouse::process(const MousePicture& picture) {
+MouseStep TrainMouse::process(const MousePicture& given) {
+  MousePicture picture = given;
+  picture.pose_measured = given.pose_measured && measured_wholly(given);
   if (picture.stamp_ns < last_stamp_ns_ - kClockSetBackNs) begin_anew();
   MouseStep step;
   step.stamp_ns = picture.stamp_ns;
@@ -297,7 +305,7 @@ MouseStep TrainMouse::process(const MousePicture& picture) {
   step.distance_m = distance_m_;
   step.height_m = picture.pose.height_m + options_.texture_depth_m;
   if (picture.stamp_ns <= last_stamp_ns_ || picture.grey.type() != CV_8UC1 || picture.grey.cols != camera_.width_px ||
-      picture.grey.rows != camera_.height_px) {
+      picture.grey.rows != camera_.height_px || !finite(picture.pose)) {
     return step;
   }
   smooth_curves(picture);
@@ -311,6 +319,7 @@ MouseStep TrainMouse::process(const MousePicture& picture) {
     reference_->errors = filter_.first(now_.prior);
     reference_->measured_m = reference_->distance_m = distance_m_;
     tentative_stamp_ns_ = picture.stamp_ns;
+    begin_places();
     step.mode = MouseMode::search;
     last_stamp_ns_ = picture.stamp_ns;
     return step;
@@ -330,7 +339,10 @@ MouseStep TrainMouse::process(const MousePicture& picture) {
     rough = find_roughly(true, predicted_m, 2.0 * band_m + kWrongStampS * std::abs(speed_mps));
   step.score = rough.score;
   step.reference_stamp_ns = reference_->seen.stamp_ns;
-  if (rough.found && align(rough, step)) {
+  const bool aligned = rough.found && align(rough, step);
+  if (aligned && shown_again()) {
+    step.mode = MouseMode::blind;  // reference and speed wait for the next picture
+  } else if (aligned) {
     accept(step);
   } else {
     give_up(step);

@@ -12,6 +12,7 @@
 
 #include "geometry/camera.hpp"
 #include "odometry/motion_filter.hpp"
+#include "odometry/recent_places.hpp"
 #include "odometry/shift_search.hpp"
 #include "odometry/standstill.hpp"
 #include "odometry/texture_alignment.hpp"
@@ -49,6 +50,7 @@ struct MousePicture {
   PoseTrust trust;  // of a measured pose
   double curvature_per_m = 0;
   double vertical_curvature_per_m = 0;
+  double exposure_s = 0;            // 0 = not known
   std::optional<double> speed_mps;  // from elsewhere, only to find the first match
 };
 
@@ -83,8 +85,9 @@ class TrainMouse {
   TrainMouse(const geometry::Intrinsics& camera, const TrainMouseOptions& options);
 
   /// Pictures in the order of their stamps; one that is not newer than the last is answered as invalid and left out.
+  /// A measured pose with a number that is none is no measured pose; without a pose at all the picture is left out.
   /// When it is older by more than a second the clock was set back: measuring begins anew, the distance goes on.
-  MouseStep process(const MousePicture& picture);
+  MouseStep process(const MousePicture& given);
 
  private:
   struct Seen {  // one picture, ready to be compared
@@ -94,6 +97,7 @@ class TrainMouse {
     CoarseView coarse;
     PosePrior prior;
     bool pose_measured = false;
+    double exposure_s = 0;
   };
   struct Reference {
     explicit Reference(const TextureReference::Options& options) : texture(options) {}
@@ -116,8 +120,11 @@ class TrainMouse {
   [[nodiscard]] Rough find_roughly(bool full_band, double predicted_m, double band_m);
   bool align(const Rough& rough, MouseStep& step);
   [[nodiscard]] PoseTie tie(double along_m) const;
+  [[nodiscard]] double supported_speed_mps() const;
+  [[nodiscard]] bool shown_again() const;
   void accept(MouseStep& step);
   [[nodiscard]] double scale_sigma() const;
+  [[nodiscard]] double blur_sigma_m() const;
   [[nodiscard]] double turn_of_camera() const;
   /// Of the foot, in the reference picture.
   [[nodiscard]] double patches_ahead_m() const;
@@ -125,6 +132,7 @@ class TrainMouse {
   void renew_reference(const MouseStep& step, double dt_s);
   double bridge(double speed_after_mps);
   void give_up(MouseStep& step);
+  void begin_places();
   void smooth_curves(const MousePicture& picture);
   void begin_anew();
 
@@ -137,6 +145,7 @@ class TrainMouse {
   Seen now_;
   Motion motion_;
   Standstill standstill_;
+  RecentPlaces recent_;  // since the last start anew
   std::vector<PatchMotion> votes_;
   std::optional<Reference> reference_;
   double curvature_per_m_ = 0;

@@ -94,6 +94,19 @@ void add_mouse(CLI::App& app, odometry::TrainMouseOptions& mouse) {
   app.add_option("--ballast-scatter", mouse.filter.ballast_scatter_m, "m")->group(group);
 }
 
+// What the files do not say stays as it is.
+void read_scenarios(const std::vector<std::string>& files, simulator::SimulationOptions& simulation) {
+  simulator::SimulatorConfig config{simulation.scenario, simulation.render, simulation.shake};
+  for (const auto& file : files) {
+    const auto status =
+        service::read_section("simulator", file, {}, {}, [&](service::Fields& fields) { config.describe(fields); });
+    if (!status.ok()) throw core::BadInput(status.error().message);
+  }
+  simulation.scenario = config.scenario;
+  simulation.render = config.render;
+  simulation.shake = config.shake;
+}
+
 Arguments parse(int argc, char** argv) {
   Arguments a;
   a.simulation.rate_hz = 60;
@@ -115,6 +128,10 @@ Arguments parse(int argc, char** argv) {
   add_mouse(app, a.mouse);
   try {
     app.parse(argc, argv);
+    if (!a.scenarios.empty()) {
+      read_scenarios(a.scenarios, a.simulation);
+      app.parse(argc, argv);  // options go over the files
+    }
     if (a.dataset.empty() == a.simulation.start.empty())
       throw CLI::ValidationError("say either --dataset FOLDER or --simulate EDGE:OFFSET");
   } catch (const CLI::ParseError& error) {
@@ -123,25 +140,11 @@ Arguments parse(int argc, char** argv) {
   return a;
 }
 
-// What the files do not say stays as the other options have it.
-void read_scenarios(const std::vector<std::string>& files, simulator::SimulationOptions& simulation) {
-  simulator::SimulatorConfig config{simulation.scenario, simulation.render, simulation.shake};
-  for (const auto& file : files) {
-    const auto status =
-        service::read_section("simulator", file, {}, {}, [&](service::Fields& fields) { config.describe(fields); });
-    if (!status.ok()) throw core::BadInput(status.error().message);
-  }
-  simulation.scenario = config.scenario;
-  simulation.render = config.render;
-  simulation.shake = config.shake;
-}
-
 std::unique_ptr<Scene> open_scene(Arguments& a) {
   if (!a.dataset.empty()) return open_dataset(a.dataset);
   auto& simulation = a.simulation;
   if (!a.map.empty())
     simulation.map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(a.map)));
-  read_scenarios(a.scenarios, simulation);
   const auto lens = simulation.render.camera;
   simulation.render.camera = {
       a.focal_px, a.focal_px, 0.5 * (a.width_px - 1), 0.5 * (a.height_px - 1), lens.k1, lens.k2, lens.p1, lens.p2,
@@ -164,6 +167,7 @@ class PoseSource {
     odometry::MousePicture picture;
     picture.grey = moment.grey;
     picture.stamp_ns = moment.stamp_ns;
+    picture.exposure_s = moment.exposure_s;
     picture.pose = mount_;
     if (a_.pose == "true") noisy_truth(moment.truth, picture);
     if (a_.pose == "detected") detect(picture);

@@ -28,7 +28,7 @@ class Dataset : public Scene {
       const auto picture = core::value_or_throw(pictures_->next());
       if (!picture) return std::nullopt;
       const auto row = truth_.find(picture->stamp_ns);
-      if (row != truth_.end()) return Moment{picture->grey, picture->stamp_ns, row->second};
+      if (row != truth_.end()) return Moment{picture->grey, picture->stamp_ns, 0, row->second};
     }
   }
   [[nodiscard]] const dataset::CameraCalibration& calibration() const override { return calibration_; }
@@ -75,6 +75,7 @@ class Simulated : public Scene {
     const double jitter_s =
         std::clamp(random_.normal(0, disturbances_.stamp_jitter_s), -0.4 / options_.rate_hz, 0.4 / options_.rate_hz);
     moment.stamp_ns = trajectory_.begin_ns() + core::to_ns(time_s + jitter_s) + pause_ns_;
+    moment.exposure_s = options_.scenario.exposure.time_s;
     moment.grey =
         renderer_.render({at.camera, at.distance_m, at.speed_mps, options_.scenario.exposure.time_s,
                           scenario_.gain(trajectory_, run_s), random_.next(), scenario_.look(time_s, at.distance_m)});

@@ -14,6 +14,7 @@ namespace railfix {
 struct Moment {
   cv::Mat grey;
   int64_t stamp_ns = 0;  // as the camera says
+  double exposure_s = 0;
   dataset::TruthRow truth;
 };
 

@@ -1,6 +1,8 @@
 // The measuring tools: each explains itself, and says what is wrong with its arguments.
 #include <gmock/gmock.h>
 
+#include <fstream>
+
 #include "support/program.hpp"
 
 namespace railfix::measuring_tools_test {
@@ -34,13 +36,44 @@ TEST(MeasuringTools, SayWhatIsWrong) {
 }
 
 TEST(MeasuringTools, FindTheRealAlignmentFromAnyFolder) {
-  setenv("RAILFIX_DATA", "/no/such/data", 1);
-  const auto outcome = test::run_program({"railfix-measure-matching", "curvature", "--count", "1"}, kPatienceS);
-  unsetenv("RAILFIX_DATA");
+  const auto outcome = test::run_program(
+      {"env", "RAILFIX_DATA=/no/such/data", RAILFIX_BIN_DIR "/railfix-measure-matching", "curvature", "--count", "1"},
+      kPatienceS);
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_EQ(outcome.err,
             "railfix-measure-matching: /no/such/data/alignment/sbb_mszw_a2.landxml does not exist; give --map, or its "
             "folder's place as RAILFIX_DATA\n");
+}
+
+TEST(MeasuringTools, OptionsGoOverScenarioFiles) {
+  const auto measured = [](const std::string& scenario_time_s) {
+    const auto file = testing::TempDir() + "railfix_scenario_" + scenario_time_s + ".yaml";
+    std::ofstream(file) << "simulator:\n  exposure: {time_s: " << scenario_time_s << "}\n";
+    const auto outcome = test::run_program({"railfix-measure-odometry",
+                                            "--simulate",
+                                            "1:100",
+                                            "--line",
+                                            "long",
+                                            "--length-m",
+                                            "2",
+                                            "--speed-kmh",
+                                            "36",
+                                            "--accelerate",
+                                            "3",
+                                            "--dwell-s",
+                                            "0.1",
+                                            "--rate-hz",
+                                            "10",
+                                            "--steps",
+                                            "--exposure-s",
+                                            "0.001",
+                                            "--scenario",
+                                            file},
+                                           kPatienceS);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.out.substr(0, outcome.out.find("processor time"));
+  };
+  EXPECT_EQ(measured("0.05"), measured("0.001"));
 }
 
 TEST(MeasuringTools, RefuseNumbersThatMeanNothing) {

@@ -74,7 +74,7 @@ describe("the page", { timeout: 600000 }, () => {
     await until("the train moves", async () => /^\d+\.\d\skm\/h$/.test(await text("#figure-speed .value")) && parseFloat(await text("#figure-speed .value")) > 1);
     assert.match(await text("#figure-motion .value"), /^Moving$/);
     assert.match(await text("#figure-position .value"), /^\d+\.\d\sm$/);
-    assert.match(await text("#figure-interval .value"), /^−\d+(\.\d+)? \/ \+\d+(\.\d+)?\sm$/);
+    assert.match(await text("#figure-interval .value"), /^\d+(\.\d+)?\sm behind \/ \d+(\.\d+)?\sm ahead$/);
     assert.match(await text("#figure-track .note"), /certain, (> )?\d/);
     assert.match(await text("#figure-integrity .value"), /^(Good|Degraded)$/);
     await until("the camera holds the position", async () => (await page.locator("#figure-integrity .sources .on", { hasText: "camera" }).count()) === 1);

@@ -106,11 +106,12 @@ class Train {
   [[nodiscard]] int frame_readers() const { return frame_.matched_readers(); }
 
   uint8_t service_state = msg::STATE_ACTIVE;
+  int64_t late_ns = 0;  // of the positions
 
  private:
   void write_state(int64_t now_ns) {
     msg::TrainState state;
-    state.stamp_ns(now_ns);
+    state.stamp_ns(now_ns - late_ns);
     state.speed_mps(12.5);
     state.acceleration_mps2(std::numeric_limits<double>::quiet_NaN());
     state.lat_deg(47.4);
@@ -306,6 +307,9 @@ TEST_F(MonitorLiveTest, SaysWhenTheTrainIsNotWell) {
     return train_->live_until([&] { return client("get", "/healthz") == wanted; });
   };
   EXPECT_TRUE(says("200\nok\n"));
+  train_->late_ns = 5'020'000'000;
+  EXPECT_TRUE(says("503\nThe position that comes now is 5.0 s old: fusion is late, or the computers' clocks differ\n"));
+  train_->late_ns = 0;
   train_->service_state = msg::STATE_FAILED;
   EXPECT_TRUE(says("503\nfusion has failed: no map\n"));
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/random.hpp"
@@ -100,6 +101,71 @@ TEST_F(PictureHealthOnTheWay, MovingAndStandingAreNotFlagged) {
   run(200, false, [](cv::Mat&) {});
   run(50, true, [](cv::Mat& m) { cv::blur(m, m, {1, 25}); });  // fast
   EXPECT_EQ(flagged_, 0);
+}
+
+/// Ballast that runs by at 30 Hz under a camera with noise of its own.
+class PictureShownAgain : public PictureHealthOnTheWay {
+ protected:
+  cv::Mat at(double pixels, bool noisy = true) {
+    const auto whole = static_cast<int>(pixels);
+    cv::Mat here = ballast_.rowRange(whole, whole + 512).clone();
+    cv::addWeighted(here, whole + 1 - pixels, ballast_.rowRange(whole + 1, whole + 513), pixels - whole, 0, here);
+    if (!noisy) return here;
+    cv::Mat noise(here.size(), CV_8UC1);
+    cv::theRNG().state = static_cast<uint64_t>(number_ + 1);
+    cv::randn(noise, 6, 2);
+    return here + noise;
+  }
+  uint32_t show(const cv::Mat& shown) { return health_.judge(number_++ * 33'333'333LL, shown); }
+  static cv::Mat coded_anew(const cv::Mat& shown) {
+    std::vector<uint8_t> jpeg;
+    cv::imencode(".jpg", shown, jpeg, {cv::IMWRITE_JPEG_QUALITY, 90});
+    return cv::imdecode(jpeg, cv::IMREAD_GRAYSCALE);
+  }
+};
+
+TEST_F(PictureShownAgain, IsFrozenThoughItWasCodedAnew) {
+  for (const int every : {2, 6}) {  // 15 and 25 Hz made to 30
+    cv::Mat last;
+    for (int i = 0; i < 60; ++i) {
+      const bool repeat = i % every == every - 1;
+      const uint32_t flags = show(repeat ? coded_anew(last) : last = at(i * 7));
+      EXPECT_TRUE(flags == (repeat ? kFrozen : 0U) || i < 12) << every << ' ' << i;
+    }
+  }
+}
+
+TEST_F(PictureShownAgain, IsToldFromAStopForSomeSeconds) {
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(show(at(i * 7)), 0U);
+  const cv::Mat last = at(20 * 7);
+  EXPECT_EQ(show(last), 0U);
+  cv::Mat other = last.clone();
+  for (int i = 0; i < 140; ++i) {
+    other.at<uint8_t>(100, i) ^= 1U;
+    EXPECT_EQ(show(other), kFrozen) << i;
+  }
+  for (int i = 140; i < 160; ++i) {
+    other.at<uint8_t>(100, i) ^= 1U;
+    (void)show(other);
+  }
+  other.at<uint8_t>(100, 160) ^= 1U;
+  EXPECT_EQ(show(other), 0U) << "by now a train may stand";
+}
+
+// Also with a camera that has next to no noise.
+TEST_F(PictureShownAgain, AStoppingAndAStandingTrainAreNotFrozen) {
+  for (const bool noisy : {true, false}) {
+    for (const double slowest_px : {0.0, 0.3}) {
+      PictureHealth health({});
+      double at_px = 0;
+      for (int i = 0; i < 200; ++i, ++number_) {
+        if (i < 60) at_px += 0.1 * (60 - i) + slowest_px;
+        cv::Mat shown = at(at_px, noisy);
+        shown.at<uint8_t>(100, i) ^= 1U;
+        EXPECT_EQ(health.judge(i * 33'333'333LL, shown) & kFrozen, 0U) << noisy << ' ' << slowest_px << ' ' << i;
+      }
+    }
+  }
 }
 
 TEST_F(PictureHealthOnTheWay, BlurIsFlaggedWhenItLastsAndRecovers) {

@@ -115,6 +115,18 @@ TEST_F(ProblemsTest, TellsWhatIsWrongWithThePosition) {
   EXPECT_EQ(only().level, Level::error);
 }
 
+// A fusion that is seconds behind but publishes steadily is not shown as live.
+TEST_F(ProblemsTest, TellsOfAPositionThatIsOldWhenItComes) {
+  train_.state_behind_s = 0.9;
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+  train_.state_behind_s = 3.24;
+  EXPECT_THAT(only().what, HasSubstr("3.2 s old"));
+  EXPECT_THAT(only().what, HasSubstr("clocks differ"));
+  EXPECT_EQ(only().level, Level::error);
+  train_.data_stands = true;
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+}
+
 TEST_F(ProblemsTest, TellsOfCertificatesBeforeTheyRunOut) {
   train_.certificate_days = 20;
   train_.certificates = {{"fusion", "coach", 20}};

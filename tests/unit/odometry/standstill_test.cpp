@@ -74,6 +74,22 @@ TEST(Standstill, LeavingLateCostsNoDistance) {
   EXPECT_NEAR(reported_m, true_m, 0.006);
 }
 
+// The long window is full at any rate: a trembling camera settles by nothing else.
+TEST(Standstill, AFastCameraSettlesToo) {
+  constexpr double kFast = 400;
+  Standstill standstill(0.003);
+  core::Random random(7);
+  int i = 0;
+  const auto at = [&](double true_m) {
+    return standstill.report(core::to_ns(1 + i++ / kFast), true_m + random.normal(0, 0.002));
+  };
+  for (int k = 400; k > 0; --k) at(10 - 0.5 * std::pow(k / kFast, 2));
+  for (int k = 0; k < 600; ++k) at(10);
+  ASSERT_TRUE(standstill.resting());
+  const double stopped_m = at(10);
+  for (int k = 0; k < 4000; ++k) ASSERT_EQ(at(10), stopped_m) << k;
+}
+
 TEST(Standstill, ADepartureAtOnceIsSeenAtOnce) {
   Feed feed(0);
   EXPECT_EQ(feed.at(0.001), 0);

@@ -20,26 +20,41 @@ class Ride {
       : ground_(seed, ground), options_(ground), mouse_(test::small_camera(), {}) {}
 
   MouseStep at(double time_s, double distance_m) {
-    MousePicture picture;
-    picture.grey = ground_.picture(test::small_camera(), shaken, distance_m, light);
-    picture.stamp_ns = 1'700'000'000'000'000'000 + core::to_ns(time_s);
-    picture.pose = pose_used.value_or(shaken);
-    picture.pose_measured = true;
-    picture.trust = trust;
-    picture.curvature_per_m = options_.curvature_per_m;
-    picture.vertical_curvature_per_m = options_.vertical_curvature_per_m;
-    return mouse_.process(picture);
+    return show(time_s, ground_.picture(test::small_camera(), shaken, distance_m, light));
+  }
+  // The last picture once more, a grey level off here and there as film that was coded anew.
+  MouseStep again(double time_s) {
+    cv::Mat coded = last_.clone();
+    for (int i = 0; i < coded.rows * coded.cols; i += 5) coded.data[i] ^= 1U;
+    return show(time_s, coded);
   }
 
   geometry::CameraPose shaken = test::cab_mount();
   std::optional<geometry::CameraPose> pose_used;
   PoseTrust trust = PoseTrust::independent(0.0003, 0.002);
   SyntheticGround::Light light;
+  double exposure_s = 0;             // as it is told; the pictures are sharp
+  double wrong_curvature_per_m = 0;  // added to what is told
 
  private:
+  MouseStep show(double time_s, const cv::Mat& grey) {
+    last_ = grey;
+    MousePicture picture;
+    picture.grey = grey;
+    picture.stamp_ns = 1'700'000'000'000'000'000 + core::to_ns(time_s);
+    picture.pose = pose_used.value_or(shaken);
+    picture.pose_measured = true;
+    picture.exposure_s = exposure_s;
+    picture.trust = trust;
+    picture.curvature_per_m = options_.curvature_per_m + wrong_curvature_per_m;
+    picture.vertical_curvature_per_m = options_.vertical_curvature_per_m;
+    return mouse_.process(picture);
+  }
+
   SyntheticGround ground_;
   SyntheticGround::Options options_;
   TrainMouse mouse_;
+  cv::Mat last_;
 };
 
 constexpr double kRate = 30.0;
@@ -173,6 +188,86 @@ TEST(TrainMouse, OwnShadowDoesNotHoldItBack) {
   for (int i = 0; i <= 20; ++i) step = ride.at(i / kRate, 0.4 * i);
   EXPECT_TRUE(step.valid);
   EXPECT_NEAR(step.distance_m, 8.0, 0.012);
+}
+
+// Every sixth picture, as film of 25 Hz that was coded anew for 30.
+TEST(TrainMouse, APictureShownAgainIsNotStandstill) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 60; ++i) {
+    const bool repeated = i > 12 && i % 6 == 0 && i < 60;
+    step = repeated ? ride.again(i / kRate) : ride.at(i / kRate, 20.0 / kRate * i);
+    EXPECT_EQ(step.valid, i >= 2 && !repeated) << i;
+    if (repeated) {
+      EXPECT_EQ(step.mode, MouseMode::blind);
+    }
+    if (step.valid) {
+      EXPECT_NEAR(step.speed_mps, 20, 0.3) << i;
+    }
+  }
+  EXPECT_NEAR(step.distance_m, 40, 0.03);
+}
+
+TEST(TrainMouse, NorIsAPictureShownForASecond) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 80; ++i) {
+    const bool repeated = i > 30 && i <= 60;
+    step = repeated ? ride.again(i / kRate) : ride.at(i / kRate, 20.0 / kRate * i);
+    EXPECT_FALSE(step.valid && repeated) << i;
+  }
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, 20.0 / kRate * 80, 0.2) << "bridged";
+}
+
+// As when a picture waits in a driver until the next one comes.
+TEST(TrainMouse, PicturesStampedCloseTogetherGiveNoSpeed) {
+  for (const double gap_s : {1e-5, 1e-3}) {
+    Ride ride;
+    MouseStep step;
+    for (int i = 0; i <= 40; ++i) {
+      step = ride.at(i == 20 ? 21 / kRate - gap_s : i / kRate, 10.0 / kRate * i);
+      EXPECT_TRUE(step.valid || i < 2) << i;
+      if (step.valid) {
+        EXPECT_NEAR(step.speed_mps, 10, 3) << i;
+      }
+    }
+    EXPECT_NEAR(step.speed_mps, 10, 0.1);
+    EXPECT_NEAR(step.distance_m, 10.0 / kRate * 40, 0.02);
+  }
+}
+
+// The speed on either side of a gap is what the second before says, though the stamps beside the gap are wrong.
+TEST(TrainMouse, AGapIsNotBridgedWithTheSpeedOfWrongStamps) {
+  constexpr double kClose = 1e-5;
+  for (const int late : {20, 52}) {  // the picture that waits for the next one: before and after the gap
+    Ride ride;
+    MouseStep step;
+    for (int i = 0; i <= 70; ++i) {
+      const bool covered = i > 21 && i <= 50;
+      ride.light.gain = covered ? 0 : 1;
+      ride.light.noise = covered ? 0.5 : 2;
+      step = ride.at(i == late ? (i + 1) / kRate - kClose : i / kRate, 10.0 / kRate * i);
+    }
+    EXPECT_TRUE(step.valid);
+    EXPECT_NEAR(step.distance_m, 10.0 / kRate * 70, 1.5) << late;
+  }
+}
+
+TEST(TrainMouse, OnePoseWithANumberThatIsNoneCostsNothing) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 30; ++i) {
+    ride.wrong_curvature_per_m = i == 15 ? std::nan("") : 0;
+    step = ride.at(i / kRate, 0.4 * i);
+    EXPECT_TRUE(step.valid || i < 2) << i;
+  }
+  EXPECT_NEAR(step.distance_m, 12, 0.02);
+  ride.pose_used = ride.shaken;
+  ride.pose_used->pitch_rad = std::nan("");
+  EXPECT_FALSE(ride.at(31 / kRate, 0.4 * 31).valid);
+  ride.pose_used.reset();
+  EXPECT_TRUE(ride.at(32 / kRate, 0.4 * 32).valid);
 }
 
 // A picture a second at 10 m/s: the ground is gone each time, only the lettering on the picture is found again.
@@ -378,6 +473,21 @@ TEST(TrainMouse, SigmaIsHonest) {
   ASSERT_GT(count, 50);
   EXPECT_LT(std::sqrt(sum / count), 2.0);
   EXPECT_GT(std::sqrt(sum / count), 0.15);
+}
+
+TEST(TrainMouse, SigmaHoldsMotionBlur) {
+  const auto sigma_m = [](double exposure_s) {
+    Ride ride;
+    ride.light.noise = 20;
+    ride.exposure_s = exposure_s;
+    MouseStep step;
+    for (int i = 0; i <= 8; ++i) step = ride.at(i / kRate, 24 / kRate * i);
+    EXPECT_TRUE(step.valid);
+    return step.step_sigma_m;
+  };
+  const double sharp_m = sigma_m(0);
+  EXPECT_NEAR(sigma_m(0.002), sharp_m, 0.05 * sharp_m) << "by day";
+  EXPECT_GT(sigma_m(0.03), 1.5 * sharp_m) << "at night";
 }
 
 TEST(TrainMouse, WrongSizeIsRefused) {

@@ -18,6 +18,21 @@ export function outward(value: number | null | undefined, digits: number): numbe
   return Math.max(0, Math.ceil((value ?? 0) * parts - 1e-6)) / parts;
 }
 
+/// How far behind and ahead the train may be at most, with the digits that the wider bound deserves.
+export function bounds(over_m: number | null, under_m: number | null): { behind: string; ahead: string } {
+  const widest = Math.max(over_m ?? 0, under_m ?? 0);
+  const digits = widest < 0.995 ? 2 : widest < 9.95 ? 1 : 0;
+  const said = (bound: number | null) => number(outward(bound, digits), digits);
+  return { behind: said(over_m), ahead: said(under_m) };
+}
+
+/// The same as one sentence's part.
+export function bounds_in_words(over_m: number | null | undefined, under_m: number | null | undefined): string {
+  if (typeof over_m !== "number" || typeof under_m !== "number") return "unknown";
+  const { behind, ahead } = bounds(over_m, under_m);
+  return `${behind}${THIN}m behind and ${ahead}${THIN}m ahead`;
+}
+
 function with_unit(value: number | null | undefined, digits: number, unit: string): string {
   const text = number(value, digits);
   return text === "unknown" ? text : `${text}${THIN}${unit}`;

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { bend, bytes, bytes_per_s, clock, duration, hertz, kmh, metres, milliseconds, number, outward, played, probability } from "../src/format";
+import { bend, bounds, bounds_in_words, bytes, bytes_per_s, clock, duration, hertz, kmh, metres, milliseconds, number, outward, played, probability } from "../src/format";
 
 const plain = (text: string) => text.replace(/\u202f/g, " ").replace(/\u2212/g, "-");
 
@@ -9,6 +9,13 @@ describe("numbers", () => {
     expect(outward(0.301, 2)).toBeCloseTo(0.31);
     expect(outward(0.3, 2)).toBeCloseTo(0.3);
     expect(outward(null, 1)).toBe(0);
+  });
+  it("says how far behind and ahead in words and never less than it is", () => {
+    expect(bounds(1.23, 4.51)).toEqual({ behind: "1.3", ahead: "4.6" });
+    expect(bounds(0.301, 0.2)).toEqual({ behind: "0.31", ahead: "0.20" });
+    expect(bounds(2, 12.01)).toEqual({ behind: "2", ahead: "13" });
+    expect(plain(bounds_in_words(2, 12.01))).toBe("2 m behind and 13 m ahead");
+    expect(plain(bounds_in_words(null, undefined))).toBe("unknown");
   });
   it("groups thousands from 10 000 on and says unknown for what is not known", () => {
     expect(plain(number(1234.56, 1))).toBe("1234.6");

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { is_sure, track_note } from "../src/track_note";
+import { is_sure, place_level, track_note } from "../src/track_note";
 
 const other = { edge: 2, offset_m: 300, probability: 0.41 };
 const note = (track_known: boolean, track_probability: number, alternatives: (typeof other)[]) =>
@@ -19,5 +19,14 @@ describe("the note on the track", () => {
     const likely = { track_known: false, track_probability: 1, alternatives: [] };
     expect(is_sure(likely)).toBe(false);
     expect(is_sure({ ...likely, track_known: true })).toBe(true);
+  });
+});
+
+describe("the figures of the place", () => {
+  it("are bad where the position must not be used", () => {
+    expect(place_level({ integrity: "unusable" }, true)).toBe("bad");
+    expect(place_level({ integrity: "unusable" }, false)).toBe("bad");
+    expect(place_level({ integrity: "degraded" }, false)).toBe("warn");
+    expect(place_level({ integrity: "ok" }, true)).toBe("");
   });
 });

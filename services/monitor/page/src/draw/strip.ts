@@ -1,5 +1,5 @@
 // The track ahead and behind as a straight line: the interval to scale, what stands beside it.
-import { metres, words } from "../format";
+import { bounds_in_words, words } from "../format";
 import type { TrackMap } from "../track_map";
 import type { TrainState } from "../wire";
 import { colours, label, polyline, round_step, sheet } from "./canvas";
@@ -66,5 +66,5 @@ export function draw_strip(canvas: HTMLCanvasElement, map: TrackMap, state: Trai
 }
 
 export function strip_in_words(state: TrainState): string {
-  return `The train is at most ${metres(state.over_m)} behind and ${metres(state.under_m)} ahead of where it is drawn.`;
+  return `The train is at most ${bounds_in_words(state.over_m, state.under_m)} of where it is drawn.`;
 }

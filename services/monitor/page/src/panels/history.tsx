@@ -2,7 +2,7 @@
 import { computed } from "@preact/signals";
 import { colours } from "../draw/canvas";
 import { draw_plot, range_of } from "../draw/plot";
-import { duration, kmh, metres, number } from "../format";
+import { bounds_in_words, duration, kmh, number } from "../format";
 import { fresh, history, state } from "../store";
 import { Drawing } from "./canvas";
 import { Nothing, Panel } from "./panel";
@@ -46,7 +46,7 @@ export function History() {
         <>
           <Drawing class="plot half" draw={draw_speed} words={`Speed over the last ${duration(length)}, now ${number(kmh(one?.speed_mps), 1)} km/h`} />
           <Drawing class="plot half" draw={draw_interval}
-            words={`Confidence interval over the last ${duration(length)}, now ${metres(one?.over_m)} behind and ${metres(one?.under_m)} ahead`} />
+            words={`Confidence interval over the last ${duration(length)}, now ${bounds_in_words(one?.over_m, one?.under_m)}`} />
           <p class="legend">
             <span class="key measured">speed; ahead</span>
             <span class="key reference solid">behind</span>

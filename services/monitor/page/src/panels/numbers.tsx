@@ -1,8 +1,8 @@
 // The figures a dispatcher reads first.
 import type { ComponentChildren } from "preact";
-import { capital, duration, kmh, metres, number, outward, words } from "../format";
+import { bounds, capital, duration, kmh, metres, number, words } from "../format";
 import { age_of, fresh, map, state } from "../store";
-import { is_sure, track_note } from "../track_note";
+import { is_sure, place_level, track_note } from "../track_note";
 import type { TrainState } from "../wire";
 
 function Figure({ id, name, value, unit, note, level = "" }: {
@@ -67,20 +67,36 @@ function reference(one: TrainState): string {
   return one.reference === null ? "no landmark passed yet" : `${metres(one.since_reference_m)} since ${words(one.reference)}`;
 }
 
+// With words: signs would read as offsets on the edge, which grow the other way when the train runs in reverse.
+function Bounds({ behind, ahead }: { behind: string; ahead: string }) {
+  return (
+    <>
+      <span class="bound">
+        {behind}
+        <span class="unit"> m behind</span>
+      </span>
+      {" / "}
+      <span class="bound">
+        {ahead}
+        <span class="unit"> m ahead</span>
+      </span>
+    </>
+  );
+}
+
 function Where({ one }: { one: TrainState }) {
   const known = one.track_known;
   const bounded = known && one.over_m !== null && one.under_m !== null;
-  const widest = Math.max(one.over_m ?? 0, one.under_m ?? 0);
-  const digits = widest < 0.995 ? 2 : widest < 9.95 ? 1 : 0;
+  const { behind, ahead } = bounds(one.over_m, one.under_m);
   const geo = one.lat === null || one.lon === null ? "" : `${one.lat.toFixed(5)}°, ${one.lon.toFixed(5)}°`;
   return (
     <>
       <Figure id="position" name={known ? `Position on ${edge_name(one.edge)}` : "Position"} value={known ? number(one.offset_m, 1) : "Unknown"}
         unit={known ? "m" : undefined} note={known ? [reference(one), geo].filter(Boolean).join(" · ") : `${metres(one.distance_m)} since the start`}
-        level={known ? "" : "warn"} />
-      <Figure id="interval" name="True position within" value={!bounded ? "Unknown" : `${number(-outward(one.over_m, digits), digits)} / +${number(outward(one.under_m, digits), digits)}`}
-        unit={bounded ? "m" : undefined} level={bounded ? "" : "warn"}
-        note={bounded ? `${metres(one.over_m)} behind to ${metres(one.under_m)} ahead` : "no bound can be given"} />
+        level={place_level(one, known)} />
+      <Figure id="interval" name="True position within" level={place_level(one, bounded)}
+        value={bounded ? <Bounds behind={behind} ahead={ahead} /> : "Unknown"}
+        note={bounded ? "of where it is shown, as its cab looks" : "no bound can be given"} />
     </>
   );
 }
