@@ -36,9 +36,9 @@ TEST(MeasuringTools, SayWhatIsWrong) {
 }
 
 TEST(MeasuringTools, FindTheRealAlignmentFromAnyFolder) {
-  const auto outcome = test::run_program(
-      {"env", "RAILFIX_DATA=/no/such/data", RAILFIX_BIN_DIR "/railfix-measure-matching", "curvature", "--count", "1"},
-      kPatienceS);
+  const auto outcome = test::run_program({"/usr/bin/env", "RAILFIX_DATA=/no/such/data",
+                                          RAILFIX_BIN_DIR "/railfix-measure-matching", "curvature", "--count", "1"},
+                                         kPatienceS);
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_EQ(outcome.err,
             "railfix-measure-matching: /no/such/data/alignment/sbb_mszw_a2.landxml does not exist; give --map, or its "
@@ -47,7 +47,7 @@ TEST(MeasuringTools, FindTheRealAlignmentFromAnyFolder) {
 
 TEST(MeasuringTools, OptionsGoOverScenarioFiles) {
   const auto measured = [](const std::string& scenario_time_s) {
-    const auto file = testing::TempDir() + "railfix_scenario_" + scenario_time_s + ".yaml";
+    const auto file = ::testing::TempDir() + "railfix_scenario_" + scenario_time_s + ".yaml";
     std::ofstream(file) << "simulator:\n  exposure: {time_s: " << scenario_time_s << "}\n";
     const auto outcome = test::run_program({"railfix-measure-odometry",
                                             "--simulate",
