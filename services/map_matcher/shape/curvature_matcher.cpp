@@ -15,8 +15,9 @@ constexpr double kGridM = 1.0;
 constexpr double kLagStepM = 2.5;
 constexpr double kLagKnownShare = 0.7;  // of the sigma of a lag that nothing tells
 constexpr size_t kFewestBins = 10;
-constexpr double kNextBin = 1.6;    // bins that lie no further apart have a place in common
-constexpr double kBetterBy = 0.97;  // a sigma that shrinks less than this is as good as it gets
+constexpr double kLookShare = 0.02;  // of the window's length is the way between two searches of it
+constexpr double kNextBin = 1.6;     // bins that lie no further apart have a place in common
+constexpr double kBetterBy = 0.97;   // a sigma that shrinks less than this is as good as it gets
 constexpr std::array<double, 5> kScales = {-1.5, -0.75, 0.0, 0.75, 1.5};  // in sigmas
 
 }  // namespace
@@ -239,6 +240,9 @@ CurvatureMatcher::Peak CurvatureMatcher::peak_of(const std::vector<double>& like
 
 std::optional<Fix> CurvatureMatcher::match(int64_t stamp_ns, double odometer_m, const Prior& prior) {
   if (bins_.size() < kFewestBins || !prior.usable()) return std::nullopt;
+  // A search of 2 km takes 50 ms.
+  if (looked_m_ && std::abs(odometer_m - *looked_m_) < kLookShare * (prior.over_m + prior.under_m)) return std::nullopt;
+  looked_m_ = odometer_m;
   const Peak peak = search(odometer_m, prior);
   const double sigma_m = std::hypot(peak.sigma_m, parameters_.sigma_floor_m);
   if (peak.at_edge || sigma_m > parameters_.max_sigma_m || peak.probability < parameters_.min_probability) {

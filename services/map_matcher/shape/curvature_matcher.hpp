@@ -50,7 +50,8 @@ class CurvatureMatcher {
     waiting_sigma_m_ = 0;
   }
   [[nodiscard]] size_t bins() const { return bins_.size(); }
-  /// Best place now. A fix uses up its measurements, so that none is counted twice. Call it every few metres.
+  /// Best place now. A fix uses up its measurements, so that none is counted twice. Call it every few metres: in a wide
+  /// window it looks less often.
   std::optional<Fix> match(int64_t stamp_ns, double odometer_m, const Prior& prior);
 
  private:
@@ -113,7 +114,8 @@ class CurvatureMatcher {
   CurvatureParameters parameters_;
   std::shared_ptr<const track::Path> path_;
   std::deque<Bin> bins_;
-  double waiting_sigma_m_ = 0;  // best sigma so far of a fix that may still become better, 0 = none
+  std::optional<double> looked_m_;  // odometer at the last search
+  double waiting_sigma_m_ = 0;      // best sigma so far of a fix that may still become better, 0 = none
 };
 
 }  // namespace railfix::map_matcher

@@ -145,6 +145,21 @@ TEST(CurvatureMatcher, ABodyThatSwaysTellsThePlaceAllTheSame) {
 }
 
 // Readings further apart than the bins, at an odd distance: each bin counts all the same.
+TEST(CurvatureMatcher, LooksLessOftenInAWideWindow) {
+  const auto path = line_of({{2000, 0, 0}, {60, 0, 0.003}, {40, 0.003, 0.003}, {60, 0.003, 0}, {2000, 0, 0}});
+  for (const double interval_m : {50.0, 1000.0}) {
+    CurvatureMatcher matcher({}, path);
+    double s = 1900;
+    const auto look_at = [&](double to_m) {
+      for (; s < to_m; s += 0.5) matcher.add(s, path->curvature_at(s), 1e-4, CurvatureOf::rails);
+      return matcher.match(1, s, {s, interval_m, interval_m, s}).has_value();
+    };
+    EXPECT_FALSE(look_at(2180)) << "it may still become better";
+    EXPECT_EQ(look_at(2185), interval_m < 100);
+    EXPECT_EQ(look_at(2225), interval_m > 100);
+  }
+}
+
 TEST(CurveExitMatcher, TheExitOfACurveIsFoundWhereItIs) {
   for (const double step_m : {1.3, 2.4, 3.7}) {
     const auto path = line_of({{400, 0, 0}, {80, 0, 0.002}, {250, 0.002, 0.002}, {80, 0.002, 0}, {400, 0, 0}});
