@@ -97,11 +97,13 @@ void Estimator::use(const GnssInput& sample) {
   }
 }
 
-// A wheel that nobody sees may slide, proven GNSS may be wrong: who is, nobody knows. Of the last word of each.
+// A wheel that nobody sees may slide, proven GNSS may be wrong: who is, nobody knows. Of the last word of each. A
+// camera that comes back does not undo it.
 void Estimator::hold_gnss(double foot_m, double sigma_m, bool contradicts) {
-  if (!contradicts || sees()) {
+  const bool began_unseen = !sees() || doubts_.gnss.behind_m + doubts_.gnss.ahead_m > 0;
+  if (!contradicts) {
     doubts_.gnss = {};
-  } else if (gnss_was_proven_) {
+  } else if (gnss_was_proven_ && began_unseen) {
     const double off_m = foot_m - filter_.path_distance_m();
     const double reach_m = parameters_->interval_factor * sigma_m;
     doubts_.gnss = {std::max(0.0, reach_m - off_m), std::max(0.0, reach_m + off_m)};
