@@ -302,7 +302,7 @@ class Estimator {
   void confirm_by_curve(bool tells_track);
   /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies_place() const;
-  void hold_gnss(double foot_m, double sigma_m, bool contradicts);
+  void hold_gnss(double foot_m, double sigma_m);
   void use_track(const FixInput& fix);
   void doubt_points_behind();
   /// Other ways that the train may have come over, to either side.

@@ -81,7 +81,7 @@ void Estimator::use(const GnssInput& sample) {
   const MeasuredPlace measured{foot_m, kGnssNewShare * once_m, StateIndex::gnss_error, kGnssLastingShare * once_m};
   if (gnss.isolated) {
     gnss.hear(agrees, kAgreementsOfGnss, sample.stamp_ns);
-    hold_gnss(foot_m, once_m, gnss.isolated);
+    hold_gnss(foot_m, once_m);
   } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
@@ -99,9 +99,9 @@ void Estimator::use(const GnssInput& sample) {
 
 // A wheel that nobody sees may slide, proven GNSS may be wrong: who is, nobody knows. Of the last word of each. A
 // camera that comes back does not undo it.
-void Estimator::hold_gnss(double foot_m, double sigma_m, bool contradicts) {
+void Estimator::hold_gnss(double foot_m, double sigma_m) {
   const bool began_unseen = !sees() || doubts_.gnss.behind_m + doubts_.gnss.ahead_m > 0;
-  if (!contradicts) {
+  if (!watch(Source::gnss).isolated) {
     doubts_.gnss = {};
   } else if (gnss_was_proven_ && began_unseen) {
     const double off_m = foot_m - filter_.path_distance_m();

@@ -40,19 +40,19 @@ class CurvatureMatcher::MapCurvature {
 };
 
 void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sigma_per_m, CurvatureOf of) {
-  if (!std::isfinite(odometer_m) || !has_sense(ViewInput{curvature_per_m, sigma_per_m * sigma_per_m})) return;
-  add(Bin{odometer_m, curvature_per_m, 1 / (sigma_per_m * sigma_per_m), of});
+  add(odometer_m, curvature_per_m, sigma_per_m, of, 0);
 }
 
 void CurvatureMatcher::add(double odometer_m, const Turn& turn) {
-  const double way_m = std::abs(turn.way_m);
-  const double sigma_per_m = turn.sigma_rad / way_m;
-  if (!std::isfinite(odometer_m) || !has_sense(ViewInput{turn.turn_rad / way_m, sigma_per_m * sigma_per_m})) return;
-  add(Bin{odometer_m - 0.5 * turn.way_m, turn.turn_rad / turn.way_m, 1 / (sigma_per_m * sigma_per_m), CurvatureOf::body,
-          turn.bias_rad / turn.way_m});
+  const double way_m = turn.way_m;
+  add(odometer_m - 0.5 * way_m, turn.turn_rad / way_m, turn.sigma_rad / way_m, CurvatureOf::body,
+      turn.bias_rad / way_m);
 }
 
-void CurvatureMatcher::add(const Bin& sample) {
+void CurvatureMatcher::add(double odometer_m, double curvature_per_m, double sigma_per_m, CurvatureOf of,
+                           double gyro_per_m) {
+  if (!std::isfinite(odometer_m) || !has_sense(ViewInput{curvature_per_m, sigma_per_m * sigma_per_m})) return;
+  const Bin sample{odometer_m, curvature_per_m, 1 / (sigma_per_m * sigma_per_m), of, gyro_per_m};
   const auto cell = [this](const Bin& b) { return std::floor(b.odometer_m / parameters_.bin_m); };
   auto bin = std::find_if(bins_.rbegin(), bins_.rend(),
                           [&](const Bin& b) { return b.of == sample.of && cell(b) == cell(sample); });

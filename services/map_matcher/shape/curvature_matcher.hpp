@@ -85,7 +85,7 @@ class CurvatureMatcher {
     double gyro = 0;
   };
   class SwayFilter;
-  void add(const Bin& sample);
+  void add(double odometer_m, double curvature_per_m, double sigma_per_m, CurvatureOf of, double gyro_per_m);
   struct Peak {
     double offset_m = 0;  // of the place from the prior's
     double sigma_m = 0;
