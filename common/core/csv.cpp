@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <ranges>
 
 #include "core/whole_file.hpp"
 
@@ -80,8 +79,9 @@ bool CsvReader::next() {
     const std::string_view content = trim(line_);
     if (content.empty() || content.front() == '#') continue;
     split(content, cells_);
-    const auto filled = [](std::string_view cell) { return !cell.empty(); };
-    const bool too_many = std::ranges::any_of(cells_ | std::views::drop(header_.size()), filled);
+    const auto named = static_cast<std::ptrdiff_t>(std::min(header_.size(), cells_.size()));
+    const bool too_many =
+        std::any_of(cells_.begin() + named, cells_.end(), [](std::string_view cell) { return !cell.empty(); });
     if (cells_.size() >= header_.size() && !too_many) return true;
     status_ = error("has " + std::to_string(cells_.size()) + " values where the header names " +
                     std::to_string(header_.size()) + " columns" +

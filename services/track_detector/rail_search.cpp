@@ -10,7 +10,7 @@ namespace {
 constexpr int kCoarse = 2;
 constexpr int kSpread = 2;
 constexpr double kSpreadColumns = 3.0;
-constexpr double kMostCells = 6e7;  // to add up in one picture: some 40 ms, ten times the usual
+constexpr double kMostCells = 6e7;     // to add up in one picture: some 40 ms, ten times the usual
 constexpr double kHandicap = 0.03;     // of the score at each limit
 constexpr double kWorthKeeping = 0.5;  // of the best score
 
@@ -118,10 +118,11 @@ void RailSearch::coarse(int turn) {
     }
     for (size_t i = static_cast<size_t>(turn % turns_); i < curvatures_.size(); i += static_cast<size_t>(turns_)) {
       const double curvature = curvatures_[i];
+      const double middle = farthest_shift_ + 0.5;  // a cast cuts off
       for (const double yaw : yaws_) {
         for (size_t k = 0; k < shifts_.size(); ++k) {
           const double shift = curvature * shift_per_curvature_[k] - yaw * shift_per_yaw_[k];
-          shifts_[k] = std::clamp(static_cast<int>(shift + farthest_shift_ + 0.5), 0, 2 * farthest_shift_);
+          shifts_[k] = std::clamp(static_cast<int>(shift + middle), 0, 2 * farthest_shift_);
         }
         try_coarse({.pitch_rad = pitch, .yaw_rad = yaw, .curvature_per_m = curvature});
       }

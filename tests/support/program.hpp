@@ -49,6 +49,7 @@ class Program {
   Program(std::vector<std::string> arguments, const Options& options) {
     arguments[0] = (std::filesystem::path(RAILFIX_BIN_DIR) / arguments[0]).string();
     std::vector<char*> argv;
+    argv.reserve(arguments.size() + 1);
     for (auto& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);
     const int out = opened(options.out);

@@ -36,9 +36,9 @@ TEST(MeasuringTools, SayWhatIsWrong) {
 }
 
 TEST(MeasuringTools, FindTheRealAlignmentFromAnyFolder) {
-  const auto outcome = test::run_program({"/usr/bin/env", "RAILFIX_DATA=/no/such/data",
-                                          RAILFIX_BIN_DIR "/railfix-measure-matching", "curvature", "--count", "1"},
-                                         kPatienceS);
+  const std::string tool = RAILFIX_BIN_DIR "/railfix-measure-matching";
+  const auto outcome =
+      test::run_program({"/usr/bin/env", "RAILFIX_DATA=/no/such/data", tool, "curvature", "--count", "1"}, kPatienceS);
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_EQ(outcome.err,
             "railfix-measure-matching: /no/such/data/alignment/sbb_mszw_a2.landxml does not exist; give --map, or its "

@@ -13,13 +13,6 @@ constexpr double kLeastSpeedMps = 1;
 constexpr double kTurnSigmaRad = 2e-4;  // of a step
 constexpr double kLostS = 5;
 constexpr double kOldStateS = map_matcher::FollowedPath::kOldStateS;
-// Curvature from pictures: 9e-5 1/m rms where a sigma of 1.4e-4 is said, over 26 km at 8 degrees.
-constexpr double kSigmaPerM = 1.4e-4;
-constexpr double kWhitePerM = 7e-5;
-constexpr double kWanderPerM = 5e-5;
-constexpr double kWanderLengthM = 20;
-constexpr double kBiasPerM = 2e-5;
-constexpr double kOutlierPerM = 2e-3;
 
 map_matcher::PlacedTrain placed(const fusion::TrainEstimate& state) {
   return {state.stamp_ns, state.position, state.speed_mps, state.distance_m, state.over_m, state.under_m};
@@ -32,7 +25,7 @@ MatcherLoop::MatcherLoop(const TrainSimulation& simulation)
       followed_(simulation.map, std::make_shared<const track::Ways>(*simulation.map)),
       search_({}, simulation.map),
       random_(simulation.stream_of(17)),
-      bias_per_m_(kBiasPerM * random_.normal()) {}
+      seen_(simulation, random_) {}
 
 bool MatcherLoop::follow(const fusion::TrainEstimate& state) {
   using Way = map_matcher::FollowedPath::Way;
@@ -54,21 +47,8 @@ bool MatcherLoop::follow(const fusion::TrainEstimate& state) {
 }
 
 void MatcherLoop::look(double arrival_s, const Motion& truth) {
-  const auto& fault = simulation_.plan().fault;
-  const bool faulty = fault.sensor == Sensor::shape && fault.active(arrival_s);
-  const double way_m = std::abs(truth.distance_m - looked_m_);
-  looked_m_ = truth.distance_m;
-  const double keep = std::exp(-way_m / kWanderLengthM);
-  wander_per_m_ = keep * wander_per_m_ + std::sqrt(1 - keep * keep) * kWanderPerM * random_.normal();
-  const double times = faulty && fault.kind == FaultKind::noise ? fault.size : 1;
-  double seen_per_m = simulation_.curvature_at(truth.distance_m, arrival_s) + bias_per_m_ +
-                      times * (wander_per_m_ + kWhitePerM * random_.normal());
-  const bool wild = random_.uniform() < 0.3;
-  if (fault.is(Sensor::shape, FaultKind::drift)) seen_per_m += fault.size * fault.progress(arrival_s);
-  if (faulty && fault.kind == FaultKind::outliers && wild) seen_per_m += kOutlierPerM;
-  if (faulty && fault.kind == FaultKind::stuck) seen_per_m = *(stuck_per_m_ = stuck_per_m_.value_or(seen_per_m));
-  if (!simulation_.sees(arrival_s) || (faulty && fault.kind == FaultKind::dropout)) return;
-  shape_->add(shape_m(), seen_per_m, kSigmaPerM, CurvatureOf::rails);
+  const auto seen_per_m = seen_.look(truth.distance_m, truth.distance_m, arrival_s);
+  if (seen_per_m) shape_->add(shape_m(), *seen_per_m, SeenShape::kSigmaPerM, CurvatureOf::rails);
 }
 
 void MatcherLoop::found(const map_matcher::Fix& fix, fusion::FixKind kind, double due_s) {
@@ -113,7 +93,7 @@ void MatcherLoop::look_for_place(const fusion::OdometryInput& step, const fusion
   if (since_s > 0 && since_s < kLostS && std::isfinite(state.speed_mps)) {
     const double moved_m = chain_.broken() ? state.speed_mps * since_s : way_m;
     const auto truth = simulation_.pictured_at(step.stamp_ns, arrival_s);
-    const double turn_rad = (simulation_.curvature_at(truth.distance_m, arrival_s) + bias_per_m_) * moved_m;
+    const double turn_rad = (simulation_.curvature_at(truth.distance_m, arrival_s) + seen_.bias_per_m()) * moved_m;
     turn = {moved_m, turn_rad + kTurnSigmaRad * random_.normal(), kTurnSigmaRad};
   }
   const auto places = search_.move(turn);

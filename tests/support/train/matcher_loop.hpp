@@ -1,6 +1,5 @@
-// map_matcher in the loop with fusion: what the camera sees of the track's shape, and beside the track, goes into the
-// real matchers, which search where fusion says, and fusion is told what they find. So errors follow from those of
-// odometer and map, last, and a wrong place leads to the next one, as on a train.
+// The real matchers of map_matcher in the loop with fusion: of the track's shape, and of what stands beside it. The
+// simulation says the track itself, and how long that takes (WholeMatcher chooses it).
 #pragma once
 
 #include <deque>
@@ -14,23 +13,21 @@
 #include "map_matcher/shape/curvature_matcher.hpp"
 #include "map_matcher/step_chain.hpp"
 #include "map_matcher/track_choice/gyro_turn.hpp"
-#include "support/train/simulation.hpp"
+#include "support/train/matching.hpp"
+#include "support/train/seen_shape.hpp"
 
 namespace railfix::train {
 
-class MatcherLoop {
+class MatcherLoop : public Matching {
  public:
   /// REQUIRES: the simulation outlives this.
   explicit MatcherLoop(const TrainSimulation& simulation);
 
-  /// `state`: what fusion says behind this step. What comes out is due now, but may be late.
   std::vector<fusion::FixInput> see(const fusion::OdometryInput& step, const fusion::TrainEstimate& state,
-                                    double arrival_s);
-  /// What it finds comes out with the next step.
-  void hear(const fusion::GnssInput& gnss, double arrival_s);
-  void feel(const fusion::ImuInput& sample) { gyro_.add(sample.stamp_ns, sample.rate_z_rps); }
-  /// Between pictures. Without a camera the states lead, and what comes out is due now.
-  std::vector<fusion::FixInput> run_on(const fusion::TrainEstimate& state, double arrival_s);
+                                    double arrival_s) override;
+  void hear(const fusion::GnssInput& gnss, double arrival_s) override;
+  void feel(const fusion::ImuInput& sample) override { gyro_.add(sample.stamp_ns, sample.rate_z_rps); }
+  std::vector<fusion::FixInput> run_on(const fusion::TrainEstimate& state, double arrival_s) override;
 
  private:
   void match_shape(int64_t stamp_ns, const fusion::TrainEstimate& state, double arrival_s);
@@ -63,10 +60,7 @@ class MatcherLoop {
   double matched_m_ = 0;
   std::deque<std::pair<double, fusion::FixInput>> found_;  // when they are due
   core::Random random_;
-  double bias_per_m_;
-  double wander_per_m_ = 0;
-  double looked_m_ = 0;
-  std::optional<double> stuck_per_m_;
+  SeenShape seen_;
 };
 
 }  // namespace railfix::train

@@ -96,7 +96,7 @@ TrainSimulation::TrainSimulation(const SimulationPlan& plan, uint64_t seed, std:
       path_(std::make_shared<const track::Path>(
           core::value_or_throw(track::Path::follow(map, start, 300000, 1000, via)))),
       drive_(drive_on(seed, plan, path_->end_m() - 10)) {
-  if (plan_.track_fixes) find_points();
+  if (plan_.track_fixes || plan_.whole_matcher) find_points();
   measure();
 }
 
@@ -118,7 +118,7 @@ void TrainSimulation::measure() {
   } else if (plan_.landmark_spacing_m > 0) {
     make_fixes();
   }
-  if (!plan_.start_told) make_network_fixes();
+  if (!plan_.start_told && !plan_.whole_matcher) make_network_fixes();
   std::stable_sort(arrivals.begin(), arrivals.end(),
                    [](const Arrival& a, const Arrival& b) { return a.arrival_s < b.arrival_s; });
 }

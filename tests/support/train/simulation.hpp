@@ -48,6 +48,7 @@ struct SimulationPlan {
   bool track_fixes = false;     // map_matcher says the track once a second, and which leg behind facing points
   bool shape = false;           // map_matcher finds places from the shape that the camera sees (MatcherLoop)
   bool sightings = false;       // ... and from what it sees beside a random line, masts and balises
+  bool whole_matcher = false;   // ... and chooses the track, and searches for a start that nobody told (WholeMatcher)
   double map_shape_m = 0.7;     // curves lie so far from where the map has them, if there is `shape`
   bool blind_spells = true;     // 5 to 15 s without camera, now and then
   bool slip = true;             // wheel turns up to 30 % too fast or slow for some seconds

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/time.hpp"
-#include "support/train/matcher_loop.hpp"
+#include "support/train/matching.hpp"
 #include "track/declared.hpp"
 
 namespace railfix::train {
@@ -151,8 +151,7 @@ void Verdict::add(const Verdict& other) {
 
 Verdict judge(const TrainSimulation& simulation, fusion::Fusion& fusion, double after_m, const Watcher& watcher) {
   Judge judge(simulation, after_m, watcher);
-  std::optional<MatcherLoop> matcher;
-  if (simulation.plan().shape || simulation.plan().sightings) matcher.emplace(simulation);
+  const auto matcher = matching_of(simulation);
   double tick_s = 0;
   bool began = false;
   for (const auto& arrival : simulation.arrivals) {

@@ -127,6 +127,7 @@ class FilmTest : public PicturesTest {
   [[nodiscard]] std::string film(const std::string& encoder, const std::vector<int64_t>& times_ms,
                                  const std::string& rate = "25/1") const {
     std::vector<int64_t> times_ns;
+    times_ns.reserve(times_ms.size());
     for (const int64_t time_ms : times_ms) times_ns.push_back(time_ms * 1'000'000);
     railfix::testing::write_film(root_ / "film", encoder, rate, times_ns);
     return root_ / "film";

@@ -68,6 +68,26 @@ TEST(Coverage, CameraAloneWithoutLandmarksDriftsInsideItsInterval) {
   EXPECT_GE(campaign.budget_share, 0.99);
 }
 
+// The real map_matcher says all there is to say of the map: the leg behind facing points every 600 m, places by masts and
+// balises, of which some are missed, false or elsewhere on the map, and the start of every second train.
+TEST(Coverage, MapMatcherTellsWhichLegItIs) {
+  SimulationPlan plan = train::campaign_plan();
+  plan.duration_s = 120;
+  plan.switch_spacing_m = 600;
+  plan.track_fixes = false;
+  plan.sightings = plan.whole_matcher = true;
+  plan.landmark_spacing_m = 0;
+  const auto told = run_campaign(plan, 6);
+  EXPECT_LE(told.p95_m, 0.5);
+  plan.start_told = false;
+  auto sum = run_campaign(plan, 6).sum;
+  EXPECT_LT(2 * sum.placeless, sum.states);
+  sum.add(told.sum);
+  EXPECT_EQ(sum.outside, 0U);
+  EXPECT_GT(sum.other_leg, 0U);  // it is in doubt at times ...
+  EXPECT_EQ(sum.other_leg_sure, 0U);
+}
+
 // Nobody says where the train begins: the way counts until map_matcher has found the place, to some metres.
 TEST(Coverage, APlaceThatIsFoundOnTheWayIsHeld) {
   SimulationPlan plan;

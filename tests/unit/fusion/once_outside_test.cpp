@@ -2,6 +2,9 @@
 // allowed, and why.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "straight_run.hpp"
 #include "support/train/verdict.hpp"
 
 namespace railfix::fusion {
