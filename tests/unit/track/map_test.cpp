@@ -300,6 +300,7 @@ TEST(Projection, TakesPlanesInMetresOnly) {
 TEST(Map, ProjectsInManyThreadsAtOnce) {
   const Map map = small_map();
   std::vector<std::thread> threads;
+  threads.reserve(4);
   std::atomic<int> wrong = 0;
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
