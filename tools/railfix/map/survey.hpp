@@ -28,7 +28,7 @@ struct SurveySighting {
 };
 
 struct SurveyOptions {
-  double stretch_m = 500;     // of a run: its place counts once in it, because fixes near each other share their errors
+  double stretch_m = 500;     // of a run: its place counts once in it at most, fixes near each other share their errors
   double knot_m = 100;        // the error of way_m is linear between knots so far apart ...
   double drift = 0.002;       // ... and changes by this share of the way (1 sigma)
   double common_share = 0.5;  // of a sighting's variance that all sightings of a thing have in common

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <set>
 
 namespace railfix::tool {
 
@@ -9,6 +11,7 @@ namespace {
 
 constexpr int kRounds = 15;
 constexpr double kLeastSigmaM = 0.01;
+constexpr double kLost = 2;  // times the variance of a place that its way has drifted by
 
 double weight_of(double sigma_m) {
   return 1.0 / std::pow(std::max(sigma_m, kLeastSigmaM), 2);
@@ -38,6 +41,7 @@ SurveySolver::SurveySolver(const std::vector<SurveySighting>& all, const std::ve
   for (const auto& seen : all) {  // a start for the error of the way: the run's place is right
     for (const int64_t k : {knot_of(seen), knot_of(seen) + 1}) state_[knots_.at({seen.run, k})] = seen.place_ahead_m;
   }
+  told_ = told_places();
   for (int round = 0; round < kRounds; ++round) solve();
 }
 
@@ -110,15 +114,46 @@ void SurveySolver::add_knots() {
   }
 }
 
-void SurveySolver::add_places_of_runs() {
-  std::map<std::pair<size_t, int64_t>, size_t> vaguest;  // of every stretch: the least of what landmarks told the run
-  for (size_t i = 0; i < all_.size(); ++i) {
-    const auto stretch = static_cast<int64_t>(std::floor(all_[i].way_m / options_.stretch_m));
-    const auto [entry, is_new] = vaguest.try_emplace({all_[i].run, stretch}, i);
-    if (all_[i].run_sigma_m > all_[entry->second].run_sigma_m) entry->second = i;
+// A run's place tells something new where its way alone would have lost what it told before.
+double SurveySolver::told_anew_after_m(double run_sigma_m) const {
+  const double drift_m = options_.drift * options_.knot_m;  // from knot to knot
+  return std::max(options_.stretch_m, kLost * options_.knot_m * std::pow(run_sigma_m / drift_m, 2));
+}
+
+std::vector<SurveySolver::ToldPlace> SurveySolver::told_places() const {
+  std::vector<size_t> order(all_.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::sort(order, {}, [&](size_t i) { return std::pair(all_[i].run, all_[i].way_m); });
+  std::vector<ToldPlace> told;
+  for (const size_t i : order) {
+    const auto& seen = all_[i];
+    const bool anew = told.empty() || all_[told.back().sighting].run != seen.run ||
+                      seen.way_m >= told.back().begin_m + told.back().length_m;
+    if (anew) told.push_back({i, seen.way_m, 0});
+    auto& last = told.back();
+    if (seen.run_sigma_m > all_[last.sighting].run_sigma_m) last.sighting = i;  // the least of what fixes told there
+    last.length_m = told_anew_after_m(all_[last.sighting].run_sigma_m);
   }
-  for (const auto& [stretch, i] : vaguest)
-    add(way_terms(i, 1.0), all_[i].place_ahead_m, weight_of(all_[i].run_sigma_m));
+  for (auto& one : told) one.runs = static_cast<double>(runs_along(one));
+  return told;
+}
+
+size_t SurveySolver::runs_along(const ToldPlace& told) const {
+  const auto& here = all_[told.sighting];
+  std::set<size_t> runs;
+  for (const auto& seen : all_) {
+    if (seen.edge == here.edge && std::abs(seen.offset_m - here.offset_m) < told.length_m) runs.insert(seen.run);
+  }
+  return runs.size();
+}
+
+// The landmarks and curves of one map have told all runs their places, wrongly in the same way: those of all runs
+// count once.
+void SurveySolver::add_places_of_runs() {
+  for (const auto& told : told_) {
+    const auto& seen = all_[told.sighting];
+    add(way_terms(told.sighting, 1.0), seen.place_ahead_m, weight_of(seen.run_sigma_m) / told.runs);
+  }
 }
 
 void SurveySolver::solve() {

@@ -40,11 +40,22 @@ class SurveySolver {
   [[nodiscard]] Eigen::Index common_index(size_t thing) const {
     return static_cast<Eigen::Index>(things_.size() + thing);
   }
+  /// What a run knew of its place along so much of its way.
+  struct ToldPlace {
+    size_t sighting = 0;  // the one with the vaguest place
+    double begin_m = 0;   // of the run's way
+    double length_m = 0;
+    double runs = 1;  // that pass there
+  };
+
   [[nodiscard]] Terms terms_of(size_t thing, size_t sighting) const;
   /// b(way_m) along the edge.
   [[nodiscard]] Terms way_terms(size_t sighting, double sign) const;
   [[nodiscard]] double own_sigma(size_t sighting) const;
   [[nodiscard]] int64_t knot_of(const SurveySighting& seen) const;
+  [[nodiscard]] double told_anew_after_m(double run_sigma_m) const;
+  [[nodiscard]] std::vector<ToldPlace> told_places() const;
+  [[nodiscard]] size_t runs_along(const ToldPlace& told) const;
   void solve();
   /// terms * state = value with this weight.
   void add(const Terms& terms, double value, double weight);
@@ -56,6 +67,7 @@ class SurveySolver {
   const std::vector<Thing>& things_;
   SurveyOptions options_;
   std::map<std::pair<size_t, int64_t>, Eigen::Index> knots_;  // of run and number along its way
+  std::vector<ToldPlace> told_;
   Eigen::VectorXd state_;
   std::vector<Eigen::Triplet<double>> normal_;
   Eigen::VectorXd right_;
