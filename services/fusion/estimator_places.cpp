@@ -15,7 +15,7 @@ constexpr double kForgotten = 2.0;  // of a landmark's sigmas is the place's whe
 constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
 constexpr int kCurvesConfirm = 3;    // ... a place that was only told
-constexpr double kSharpGnssM = 2.0;  // one sigma: knows a told start as well as a landmark does
+constexpr double kSharpGnssM = 2.0;  // one sigma of an RTK solution that knows a told start as a landmark does
 constexpr double kCorrectedM = 5.0;
 constexpr double kAsFarM = 3.0;
 constexpr double kLoose = 3.0;       // times by what ways differ: then a fix moves the place and hardly a scale
@@ -23,6 +23,10 @@ constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is n
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
 constexpr double kGnssNewShare = 0.5;
+
+bool is_rtk(const GnssInput& sample) {
+  return sample.fix == 4 || sample.fix == 5;
+}
 
 double gnss_sigma_m(const GnssInput& sample, const FusionParameters& p) {
   const double hdop = std::max(sample.hdop, 0.5);
@@ -86,7 +90,9 @@ void Estimator::use(const GnssInput& sample) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
     if (confirms_start(sample.tells_track)) {
-      place_.told_by = once_m <= kSharpGnssM ? ToldBy::nobody : ToldBy::start_and_gnss;
+      // A single fix errs by metres that last, however low its HDOP is.
+      const bool is_sharp = is_rtk(sample) && once_m <= kSharpGnssM;
+      place_.told_by = is_sharp ? ToldBy::nobody : ToldBy::start_and_gnss;
     }
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
     if (gnss_proven()) place_.wrong_place.found();
