@@ -91,6 +91,7 @@ void MapMatcher::restart() {
   searched_ns_ = 0;
   shaped_ns_ = 0;
   matched_m_ = 0;
+  unseen_m_ = 0;
 }
 
 PlaceFixes MapMatcher::add(const StateInput& state) {
