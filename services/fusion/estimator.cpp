@@ -192,7 +192,8 @@ void Estimator::place_like(const Estimator& other) {
   unwatched_ = other.unwatched_;
 }
 
-// Distance and speed run on. What a false place has taught of the scales is forgotten with it.
+// Distance and speed run on. What a false place has taught of the scales is forgotten with it. What GNSS said against a
+// wheel stays held: the wheel may have slid, and then the distance is as wrong as the place was.
 void Estimator::give_place_up(Against because) {
   filter_.forget_references();
   place_ = {};
