@@ -244,8 +244,8 @@ class Estimator {
     double reference_m = 0;          // ... and at the reference
     std::array<uint32_t, 16> met{};  // landmarks that were used last, newest first; 0 = none
     int landmarks_agreed = 0;        // as landmarks_agreed()
-    // Until a landmark tells them apart: over other ways that lead to tracks that were declared, or that map_matcher
-    // has named, and as far as it now says another place without naming one.
+    // Until a landmark or a curve tells them apart: over other ways that lead to tracks that were declared, or that
+    // map_matcher has named, and as far as it now says another place without naming one.
     Sides joined;
     Sides other_ways;
     Sides said_elsewhere;

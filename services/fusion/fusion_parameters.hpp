@@ -68,7 +68,7 @@ struct FusionParameters {
   double gate_gnss = 4.0;
   double gate_fix = 4.0;
 
-  // The interval that is promised: factor * sigma + floor + drift * distance since the last fix.
+  // The interval that is promised: factor * sigma + floor + drift * distance since the last fix that was not vague.
   double interval_factor = 4.0;
   double interval_floor_m = 0.5;
   double interval_drift = 0.003;

@@ -56,7 +56,7 @@ class TrackChooser {
   void sight(const Sighting& sighting);
   /// The curvature of the rails in a picture taken here (left positive).
   void see(double curvature_per_m, double sigma_per_m);
-  /// Nothing before the first window, and where every way has ended.
+  /// Nothing before the first window, and where each of several ways has ended.
   [[nodiscard]] std::optional<TrackChoice> choice() const;
   /// How probable it is that the train runs over this landmark, or over one that is alike at the same place of another
   /// way; 1 where no way has it, or there is but one.
