@@ -202,7 +202,7 @@ bool Hypotheses::adopt_by_fix(const FixInput& fix, const Estimator& before, cons
   }
   const bool two_odometers = main_.watch(Source::camera).seen_ns != 0 && main_.watch(Source::wheel).seen_ns != 0;
   if (only == nullptr || !two_odometers) return false;
-  adopt(*only);
+  adopt(*only, without_faulty(*only));
   // The fixes that were not sure are no surer now.
   doubters_ = doubters;
   doubters_.push_back({before, fix.landmark, fix.kind == FixKind::curvature});

@@ -105,7 +105,9 @@ class Hypotheses {
   /// The main one is confirmed; `unexpected`: by a fix that was no small way from where it had been expected.
   void confirm_rivals(bool unexpected);
   void exclude_faulty();
-  void adopt(Rival& rival);
+  [[nodiscard]] Estimator without_faulty(const Rival& rival) const;
+  /// It becomes the main one as `next`.
+  void adopt(Rival& rival, Estimator next);
   void take_along(Doubter& doubter, const Estimator& next) const;
   void begin_rival(Source source);
   void ask_rivals();
