@@ -18,8 +18,11 @@ constexpr int kCurvesConfirm = 3;    // ... a place that was only told
 constexpr double kSharpGnssM = 2.0;  // one sigma of an RTK solution that knows a told start as a landmark does
 constexpr double kCorrectedM = 5.0;
 constexpr double kAsFarM = 3.0;
-constexpr double kLoose = 3.0;       // times by what ways differ: then a fix moves the place and hardly a scale
-constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
+constexpr double kElsewhereM = 10.0;     // a second fix nearer than that to the first may be wrong as that one is
+constexpr double kSameSigmas = 4.0;      // two that say the same are no further apart, ...
+constexpr double kSameDriftPerM = 0.04;  // ... but for what the scales may be wrong by on the way between
+constexpr double kLoose = 3.0;           // times by what ways differ: then a fix moves the place and hardly a scale
+constexpr double kOffTrackM = 15.0;      // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
 constexpr double kGnssNewShare = 0.5;
@@ -371,10 +374,10 @@ void Estimator::doubt_surprise(double sigma_m) {
 // One fix alone never moves the train against the filter; a second one elsewhere that says the same does.
 void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer& offer) {
   const double distance_m = filter_.value(StateIndex::distance);
-  if (refused_fix_ && std::abs(distance_m - refused_fix_->distance_m) > 10) {
-    const double drift_m = 0.04 * std::abs(distance_m - refused_fix_->distance_m);
+  if (refused_fix_ && std::abs(distance_m - refused_fix_->distance_m) > kElsewhereM) {
+    const double drift_m = kSameDriftPerM * std::abs(distance_m - refused_fix_->distance_m);
     const double apart_m = std::abs(offer.residual - refused_fix_->residual_m);
-    if (apart_m < 4 * std::hypot(fix.sigma_m, refused_fix_->sigma_m) + drift_m) {
+    if (apart_m < kSameSigmas * std::hypot(fix.sigma_m, refused_fix_->sigma_m) + drift_m) {
       // What was wrong may have taught a wrong scale, too.
       filter_.loosen_origin(std::abs(offer.residual) + fix.sigma_m);
       filter_.loosen_scale(*parameters_);

@@ -6,6 +6,8 @@
 
 namespace railfix::fusion {
 
+inline constexpr double kGyroBiasSigmaRps = 0.01;  // of any gyro's before anything has told
+
 struct FusionParameters {
   // The train.
   double start_sigma_m = 1.0;            // of the configured start

@@ -19,6 +19,7 @@ constexpr int kRecentClones = 2;  // pictures before this one that the next step
 constexpr double kUnknownPositionM = 1e5;
 constexpr double kUnknownSpeedMps = 60.0;
 constexpr double kLongestStepS = 0.1;
+constexpr double kGyroBiasWalk2 = 1e-10;  // (rad/s)^2 a second: it changes by 0.6 mrad/s in an hour
 
 double squared(double value) {
   return value * value;
@@ -32,7 +33,7 @@ MotionFilter::MotionFilter(const FusionParameters& parameters, const OdometerSca
   StateVector sigma(kCore);
   sigma << 0.0, 0.0, origin_known ? parameters.start_sigma_m : kUnknownPositionM, kUnknownSpeedMps,
       parameters.acceleration_sigma_mps2, parameters.accel_bias_sigma_mps2, scales.camera_sigma, scales.wheel_sigma,
-      kUnknownPositionM, 0.01, parameters.shape_error_sigma_m, 1.0;
+      kUnknownPositionM, kGyroBiasSigmaRps, parameters.shape_error_sigma_m, 1.0;
   ud_ = estimation::UdFilter(StateVector(sigma.cwiseAbs2()));
 }
 
@@ -133,7 +134,7 @@ void MotionFilter::step(double dt_s, const FusionParameters& p) {
       {StateIndex::other_scale, m.other_noise},
       {StateIndex::camera_odometer, squared(p.visual_creep) * way_m},
       {StateIndex::wheel_odometer, squared(p.wheel_creep) * way_m},
-      {StateIndex::gyro_bias, 1e-10 * dt_s},
+      {StateIndex::gyro_bias, kGyroBiasWalk2 * dt_s},
       {StateIndex::shape_error, squared(p.shape_error_sigma_m) * (1 - squared(m.shape_keep))},
       {StateIndex::gnss_error, 1 - squared(m.gnss_keep)}};
   constexpr int kNoises = static_cast<int>(std::size(noises));
