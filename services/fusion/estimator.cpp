@@ -69,13 +69,8 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
   start_ns_ = std::min(start_ns_, stamp_ns);
 }
 
-void Estimator::apply_unwidened(const Event& event) {
-  unwidened_ = true;
-  apply(event);
-  unwidened_ = false;
-}
-
-void Estimator::apply(const Event& event) {
+void Estimator::apply(const Event& event, const FixContext& context) {
+  context_ = context;
   slip_began_ = false;
   fix_verdict_ = FixVerdict::none;
   fix_offer_ = {};

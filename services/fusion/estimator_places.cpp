@@ -288,8 +288,8 @@ Offer Estimator::offer_place_again(double path_distance_m, double sigma_m) {
 }
 
 double Estimator::doubted_beyond_sigma_m() const {
-  const auto promised = unwidened_ ? interval() : widened(interval());
-  return std::max(centre_m() - promised.rear_m, promised.front_m - centre_m()) - known_to_m() + excess_m_;
+  const auto promised = context_.unwidened ? interval() : widened(interval());
+  return std::max(centre_m() - promised.rear_m, promised.front_m - centre_m()) - known_to_m() + context_.excess_m;
 }
 
 void Estimator::accept(const FixInput& fix) {
@@ -315,7 +315,7 @@ void Estimator::accept(const FixInput& fix) {
   if (!by_chance) place_.wrong_place.found();
   doubts_ = {};
   if (tells_ways_apart(fix)) place_.joined = place_.other_ways = place_.said_elsewhere = {};
-  if (!unwidened_ || fix.kind != FixKind::curvature) unwatched_ = {.distance_m = unwatched_.distance_m};
+  if (!context_.unwidened || fix.kind != FixKind::curvature) unwatched_ = {.distance_m = unwatched_.distance_m};
   place_.fix_m = distance_m();
   mark_reference(fix);
   if (fix.landmark != 0 && !has_met(fix.landmark)) {
@@ -366,7 +366,7 @@ double Estimator::reach_m(const Offer& offer, double sigma_m) const {
 // It or the one before is wrong by more than it says, or both are: what makes one err makes its neighbour err alike.
 // Until the next one.
 void Estimator::doubt_surprise(double sigma_m) {
-  if (fix_sigmas_off(excess_m_) < kSurprisingSigmas) return;
+  if (fix_sigmas_off(context_.excess_m) < kSurprisingSigmas) return;
   const double reach_m = this->reach_m(fix_offer_, sigma_m);
   doubts_.refused = {reach_m, reach_m};
 }

@@ -190,7 +190,7 @@ void MotionFilter::clone_now(int64_t keep_ns) {
 Offer MotionFilter::offer_step(int64_t reference_stamp_ns, double step_m, double sigma_m, double gate) {
   const auto clone = clone_index(reference_stamp_ns);
   if (!clone) return {};
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::camera_odometer)) = 1;
   h(*clone) = -1;
   return offer(h, step_m - (value(StateIndex::camera_odometer) - x_(*clone)), sigma_m, gate);
@@ -198,7 +198,7 @@ Offer MotionFilter::offer_step(int64_t reference_stamp_ns, double step_m, double
 
 Offer MotionFilter::offer_speed(double speed_mps, double sigma_mps, double gate) {
   const double per_camera = 1 / to_unit(Odometer::camera);
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::speed)) = per_camera;
   if (unit_ == Odometer::wheel) {
     h(index(StateIndex::other_scale)) = -value(StateIndex::speed) * squared(per_camera);
@@ -207,20 +207,20 @@ Offer MotionFilter::offer_speed(double speed_mps, double sigma_mps, double gate)
 }
 
 Offer MotionFilter::offer_wheel(double wheel_m, double sigma_m, double gate) {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::wheel_odometer)) = 1;
   return offer(h, wheel_m - value(StateIndex::wheel_odometer), sigma_m, gate);
 }
 
 Offer MotionFilter::offer_acceleration(double accel_mps2, double sigma_mps2, double gate) {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::acceleration)) = 1;
   h(index(StateIndex::accel_bias)) = 1;
   return offer(h, accel_mps2 - value(StateIndex::acceleration) - value(StateIndex::accel_bias), sigma_mps2, gate);
 }
 
 Offer MotionFilter::offer_position(const MeasuredPlace& place, double gate) {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::distance)) = 1;
   h(index(StateIndex::origin)) = 1;
   double expected_m = path_distance_m();
@@ -241,7 +241,7 @@ Offer MotionFilter::test_position(double path_distance_m, double sigma_m, double
 Offer MotionFilter::offer_yaw_rate(double rate_rps, double curvature_per_m, double curvature_rate_per_m2,
                                    double sigma_rps, double gate) {
   const double speed_mps = this->speed_mps();
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::distance)) = speed_mps * curvature_rate_per_m2;
   h(index(StateIndex::origin)) = speed_mps * curvature_rate_per_m2;
   h(index(StateIndex::shape_error)) = speed_mps * curvature_rate_per_m2;
@@ -350,7 +350,7 @@ double MotionFilter::sigma(StateIndex state) const {
 }
 
 double MotionFilter::path_sigma_m() const {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::distance)) = 1;
   h(index(StateIndex::origin)) = 1;
   return std::sqrt(ud_.variance(h));
@@ -361,7 +361,7 @@ double MotionFilter::to_unit(Odometer odometer) const {
 }
 
 StateVector MotionFilter::scale_row(Odometer odometer) const {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::unit_scale)) = 1;
   if (odometer != unit_) h(index(StateIndex::other_scale)) = 1;
   return h;
@@ -386,7 +386,7 @@ std::optional<int> MotionFilter::clone_index(int64_t stamp_ns) const {
   return static_cast<int>(it - clones_.begin());
 }
 
-StateVector MotionFilter::row() const {
+StateVector MotionFilter::zero_row() const {
   return StateVector::Zero(x_.size());
 }
 
