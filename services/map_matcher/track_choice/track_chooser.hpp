@@ -107,6 +107,13 @@ class TrackChooser {
   /// Of what lies between the rails that the train runs on.
   void use_sure(const std::vector<double>& log_fits);
   void run_pictures(double way_m);
+  /// A track where the train may be: the places there, best first, and the probability of them all.
+  struct WeighedTrack {
+    std::vector<TrackOption> places;
+    double probability = 0;
+  };
+  /// Best first; nothing where every way has ended.
+  [[nodiscard]] std::vector<WeighedTrack> weigh_tracks() const;
   /// Logarithm of prior and all evidence.
   [[nodiscard]] double evidence(const Hypothesis& hypothesis) const;
   [[nodiscard]] double of_turning(const Hypothesis& hypothesis) const;
