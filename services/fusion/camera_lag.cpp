@@ -110,7 +110,7 @@ void CameraLag::add(const OdometryInput& step) {
   last_step_ns_ = step.stamp_ns;
   if (jumped) {
     has_jumped_ = std::abs(passed_s) < kPauseS;
-    fitted_(2) += jumped->s;
+    fitted_(2) += jumped->late_s;
     doubt(jumped->sigma_s);
   } else if (passed_s < interval_s_ || !is_whole(passed_s, interval_s_)) {
     interval_s_ = passed_s;

@@ -21,7 +21,7 @@ namespace railfix::fusion {
 class CameraLag {
  public:
   struct Lag {
-    double s = 0;  // positive: the camera's stamps are late, or the wheel's early
+    double late_s = 0;  // the camera's stamps, or the wheel's early; below 0: the other way round
     double sigma_s = 0;
   };
   /// Before anything has shown it.

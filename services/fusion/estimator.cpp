@@ -69,13 +69,8 @@ void Estimator::rebase_clock(int64_t stamp_ns) {
   start_ns_ = std::min(start_ns_, stamp_ns);
 }
 
-void Estimator::apply_unwidened(const Event& event) {
-  unwidened_ = true;
-  apply(event);
-  unwidened_ = false;
-}
-
-void Estimator::apply(const Event& event) {
+void Estimator::apply(const Event& event, const FixContext& context) {
+  context_ = context;
   slip_began_ = false;
   fix_verdict_ = FixVerdict::none;
   fix_offer_ = {};
@@ -192,7 +187,8 @@ void Estimator::place_like(const Estimator& other) {
   unwatched_ = other.unwatched_;
 }
 
-// Distance and speed run on. What a false place has taught of the scales is forgotten with it.
+// Distance and speed run on. What a false place has taught of the scales is forgotten with it. What GNSS said against a
+// wheel stays held: the wheel may have slid, and then the distance is as wrong as the place was.
 void Estimator::give_place_up(Against because) {
   filter_.forget_references();
   place_ = {};

@@ -67,6 +67,15 @@ struct Interval {
 /// knows it to some 10 m only, and where it alone has told it, the train may be on the track beside.
 enum class ToldBy : uint8_t { nobody, start, start_and_gnss, gnss };
 
+/// What a fix must know of those beside whom it is used.
+struct FixContext {
+  /// They promise so much more: a fix that is used must not be weighed against the filter's sigma alone.
+  double excess_m = 0;
+  /// The interval is asked without widened(): a vague fix leaves what slips may have added as it is, instead of making
+  /// it part of what the interval holds.
+  bool unwidened = false;
+};
+
 /// A plain value; events are applied in the order of their stamps (Fusion sees to that).
 class Estimator {
  public:
@@ -74,10 +83,7 @@ class Estimator {
   Estimator(const FusionParameters* parameters, const OdometerScales& scales, std::shared_ptr<const track::Path> path,
             int64_t stamp_ns);
 
-  void apply(const Event& event);
-  /// The same for one whose interval is asked without widened(): a vague fix leaves what slips may have added as it is,
-  /// instead of making it part of what the interval holds.
-  void apply_unwidened(const Event& event);
+  void apply(const Event& event, const FixContext& context = {});
   /// Moves on without a measurement.
   void predict_to(int64_t stamp_ns);
   void rebase_clock(int64_t stamp_ns);
@@ -124,8 +130,6 @@ class Estimator {
   void doubt_place(const Sides& beyond);
   /// Its last reference lies so far back.
   void refer_back(double since_reference_m);
-  /// Others promise so much more than this one: a fix that it uses must not be weighed against its sigma alone.
-  void contradicted_by(double excess_m) { excess_m_ = excess_m; }
   /// The state with this promised interval; since_sure_m: way since the last place that is beyond doubt.
   /// REQUIRES: predict_to(stamp_ns()) was the last call (as for interval()).
   [[nodiscard]] TrainEstimate estimate(const Interval& promised, double since_sure_m) const;
@@ -244,8 +248,8 @@ class Estimator {
     double reference_m = 0;          // ... and at the reference
     std::array<uint32_t, 16> met{};  // landmarks that were used last, newest first; 0 = none
     int landmarks_agreed = 0;        // as landmarks_agreed()
-    // Until a landmark tells them apart: over other ways that lead to tracks that were declared, or that map_matcher
-    // has named, and as far as it now says another place without naming one.
+    // Until a landmark or a curve tells them apart: over other ways that lead to tracks that were declared, or that
+    // map_matcher has named, and as far as it now says another place without naming one.
     Sides joined;
     Sides other_ways;
     Sides said_elsewhere;
@@ -384,8 +388,7 @@ class Estimator {
   double alone_slowest_mps_ = 0;  // that the wheel has said since it measures alone
   double alone_fastest_mps_ = 0;
   double unchecked_m_ = 0;  // of the first step, until a second one or the wheel agrees
-  double excess_m_ = 0;     // that others promise beyond this one's interval
-  bool unwidened_ = false;  // for the present event
+  FixContext context_;      // of the present event
 };
 
 }  // namespace railfix::fusion

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kAgreementsOfImu = 60;
 constexpr int kRepeatedSamples = 10;          // and for ...
-constexpr double kRepeatedS = 0.15;           // ... so long
+constexpr double kRepeatedS = 0.15;           // ... so long, as map_matcher's gyro (gyro_turn)
 constexpr double kGyroPositionSigmaM = 30.0;  // within which the curvature may be taken as linear
 constexpr double kTurnSigmas = 4.0;
 constexpr double kTurnSigmasOfTwo = 2.0;  // without the worst second
@@ -64,7 +64,6 @@ void Estimator::use_acceleration(double accel_mps2, int64_t stamp_ns) {
   if (accel_repeated_.lasts(kRepeatedSamples, kRepeatedS)) {
     imu.isolate(stamp_ns);
     imu.convicted = true;
-    imu.agreed = 0;
     return;
   }
   doubt_grade();

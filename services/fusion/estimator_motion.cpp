@@ -28,7 +28,7 @@ constexpr double kSleeperM = 0.7;  // one more or less: the odd error of a step
 constexpr double kHiddenSlipMps = 0.7;
 constexpr double kHiddenSlipShare = 0.07;  // of the speed
 constexpr double kUnseenBiasSigmas = 4.0;
-constexpr double kUnknownSpeedMps = 10.0;
+constexpr double kMisledSpeedMps = 10.0;  // one sigma of a speed that a wheel found wrong had told
 
 }  // namespace
 
@@ -138,7 +138,7 @@ void Estimator::isolate_wheel() {
   // On trial it was wrong all the time, not since a second ago, and the speed at which the camera came back was its
   // own.
   const bool failed_trial = wheel_.on_trial && sees();
-  if (failed_trial) filter_.loosen_speed(kUnknownSpeedMps);
+  if (failed_trial) filter_.loosen_speed(kMisledSpeedMps);
   slip_began_ = !failed_trial;
   wheel_.on_trial = false;
 }
@@ -287,7 +287,7 @@ void Estimator::recover_wheel(const WheelInput& sample, double wheel_m, double s
   // Without a camera for so long nothing knows the speed better than a wheel that turns.
   const int64_t since_ns = std::max(watch(Source::wheel).changed_ns, watch(Source::camera).used_ns);
   const bool alone = !is_watched() && core::seconds(sample.stamp_ns - since_ns) > kBridgeS;
-  if (alone && turns && !good) filter_.loosen_speed(kUnknownSpeedMps);
+  if (alone && turns && !good) filter_.loosen_speed(kMisledSpeedMps);
   begin_window();
   if (wheel_.good_windows < kGoodWindows && !(alone && turns)) return;
   watched(Source::wheel).accept(sample.stamp_ns);

@@ -15,14 +15,21 @@ constexpr double kForgotten = 2.0;  // of a landmark's sigmas is the place's whe
 constexpr double kBesideLandmarkS = 1.0;
 constexpr double kBendsHereM = 3.0;  // in a window of some 50 m to either side that is rarely by chance
 constexpr int kCurvesConfirm = 3;    // ... a place that was only told
-constexpr double kSharpGnssM = 2.0;  // one sigma: knows a told start as well as a landmark does
+constexpr double kSharpGnssM = 2.0;  // one sigma of an RTK solution that knows a told start as a landmark does
 constexpr double kCorrectedM = 5.0;
 constexpr double kAsFarM = 3.0;
-constexpr double kLoose = 3.0;       // times by what ways differ: then a fix moves the place and hardly a scale
-constexpr double kOffTrackM = 15.0;  // a GNSS fix further beside the track is none
+constexpr double kElsewhereM = 10.0;     // a second fix nearer than that to the first may be wrong as that one is
+constexpr double kSameSigmas = 4.0;      // two that say the same are no further apart, ...
+constexpr double kSameDriftPerM = 0.04;  // ... but for what the scales may be wrong by on the way between
+constexpr double kLoose = 3.0;           // times by what ways differ: then a fix moves the place and hardly a scale
+constexpr double kOffTrackM = 15.0;      // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
 constexpr double kGnssNewShare = 0.5;
+
+bool is_rtk(const GnssInput& sample) {
+  return sample.fix == 4 || sample.fix == 5;
+}
 
 double gnss_sigma_m(const GnssInput& sample, const FusionParameters& p) {
   const double hdop = std::max(sample.hdop, 0.5);
@@ -86,7 +93,9 @@ void Estimator::use(const GnssInput& sample) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
     if (confirms_start(sample.tells_track)) {
-      place_.told_by = once_m <= kSharpGnssM ? ToldBy::nobody : ToldBy::start_and_gnss;
+      // A single fix errs by metres that last, however low its HDOP is.
+      const bool is_sharp = is_rtk(sample) && once_m <= kSharpGnssM;
+      place_.told_by = is_sharp ? ToldBy::nobody : ToldBy::start_and_gnss;
     }
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
     if (gnss_proven()) place_.wrong_place.found();
@@ -279,8 +288,8 @@ Offer Estimator::offer_place_again(double path_distance_m, double sigma_m) {
 }
 
 double Estimator::doubted_beyond_sigma_m() const {
-  const auto promised = unwidened_ ? interval() : widened(interval());
-  return std::max(centre_m() - promised.rear_m, promised.front_m - centre_m()) - known_to_m() + excess_m_;
+  const auto promised = context_.unwidened ? interval() : widened(interval());
+  return std::max(centre_m() - promised.rear_m, promised.front_m - centre_m()) - known_to_m() + context_.excess_m;
 }
 
 void Estimator::accept(const FixInput& fix) {
@@ -306,7 +315,7 @@ void Estimator::accept(const FixInput& fix) {
   if (!by_chance) place_.wrong_place.found();
   doubts_ = {};
   if (tells_ways_apart(fix)) place_.joined = place_.other_ways = place_.said_elsewhere = {};
-  if (!unwidened_ || fix.kind != FixKind::curvature) unwatched_ = {.distance_m = unwatched_.distance_m};
+  if (!context_.unwidened || fix.kind != FixKind::curvature) unwatched_ = {.distance_m = unwatched_.distance_m};
   place_.fix_m = distance_m();
   mark_reference(fix);
   if (fix.landmark != 0 && !has_met(fix.landmark)) {
@@ -357,7 +366,7 @@ double Estimator::reach_m(const Offer& offer, double sigma_m) const {
 // It or the one before is wrong by more than it says, or both are: what makes one err makes its neighbour err alike.
 // Until the next one.
 void Estimator::doubt_surprise(double sigma_m) {
-  if (fix_sigmas_off(excess_m_) < kSurprisingSigmas) return;
+  if (fix_sigmas_off(context_.excess_m) < kSurprisingSigmas) return;
   const double reach_m = this->reach_m(fix_offer_, sigma_m);
   doubts_.refused = {reach_m, reach_m};
 }
@@ -365,10 +374,10 @@ void Estimator::doubt_surprise(double sigma_m) {
 // One fix alone never moves the train against the filter; a second one elsewhere that says the same does.
 void Estimator::refuse(const FixInput& fix, double path_distance_m, const Offer& offer) {
   const double distance_m = filter_.value(StateIndex::distance);
-  if (refused_fix_ && std::abs(distance_m - refused_fix_->distance_m) > 10) {
-    const double drift_m = 0.04 * std::abs(distance_m - refused_fix_->distance_m);
+  if (refused_fix_ && std::abs(distance_m - refused_fix_->distance_m) > kElsewhereM) {
+    const double drift_m = kSameDriftPerM * std::abs(distance_m - refused_fix_->distance_m);
     const double apart_m = std::abs(offer.residual - refused_fix_->residual_m);
-    if (apart_m < 4 * std::hypot(fix.sigma_m, refused_fix_->sigma_m) + drift_m) {
+    if (apart_m < kSameSigmas * std::hypot(fix.sigma_m, refused_fix_->sigma_m) + drift_m) {
       // What was wrong may have taught a wrong scale, too.
       filter_.loosen_origin(std::abs(offer.residual) + fix.sigma_m);
       filter_.loosen_scale(*parameters_);

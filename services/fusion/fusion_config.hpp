@@ -106,7 +106,8 @@ struct FusionConfig {
     f.number("gate_fix", p.gate_fix, {1, 100}, "sigma", "The same for position fixes.");
     f.number("interval_factor", p.interval_factor, {1, 20}, "sigma", "Promised interval: this many sigma ...");
     f.number("interval_floor_m", p.interval_floor_m, {0, 50}, "m", "... and this much in any case ...");
-    f.number("interval_drift", p.interval_drift, {0, 0.5}, "m/m", "... and this share of the way since the last fix.");
+    f.number("interval_drift", p.interval_drift, {0, 0.5}, "m/m",
+             "... and this share of the way since the last fix (not a vague one).");
     f.number("budget_m", p.budget_m, {0.1, 1000}, "m", "Allowed interval (SUBSET-041): this much ...");
     f.number("budget_per_m", p.budget_per_m, {0, 1}, "m/m", "... and this share of the way since the reference.");
     f.number("unusable_budgets", p.unusable_budgets, {1, 1000}, "", "An interval of so many budgets is no position.");

@@ -6,6 +6,8 @@
 
 namespace railfix::fusion {
 
+inline constexpr double kGyroBiasSigmaRps = 0.01;  // of any gyro's before anything has told
+
 struct FusionParameters {
   // The train.
   double start_sigma_m = 1.0;            // of the configured start
@@ -68,7 +70,7 @@ struct FusionParameters {
   double gate_gnss = 4.0;
   double gate_fix = 4.0;
 
-  // The interval that is promised: factor * sigma + floor + drift * distance since the last fix.
+  // The interval that is promised: factor * sigma + floor + drift * distance since the last fix that was not vague.
   double interval_factor = 4.0;
   double interval_floor_m = 0.5;
   double interval_drift = 0.003;

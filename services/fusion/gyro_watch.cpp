@@ -74,8 +74,8 @@ std::optional<GyroWatch::Fault> GyroWatch::fault_now(const Turned& turned) {
                 turned.time_s};
   if (turned.track_rad) pieces_[0].gyro_from_track_rad = turned.gyro_rad - *turned.track_rad;
   if (contradicted()) {
-    bias_variance_ =
-        std::min(bias_variance_ + kNoBiasRps * kNoBiasRps * turned.time_s / kForgetS, kNoBiasRps * kNoBiasRps);
+    bias_variance_ = std::min(bias_variance_ + kGyroBiasSigmaRps * kGyroBiasSigmaRps * turned.time_s / kForgetS,
+                              kGyroBiasSigmaRps * kGyroBiasSigmaRps);
     return Fault::contradicted;
   }
   learn_bias(pieces_[0].gyro_from_camera_rad, pieces_[0].variance, turned.time_s);

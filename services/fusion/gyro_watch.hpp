@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/repeated.hpp"
+#include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
 
 namespace railfix::fusion {
@@ -62,8 +63,7 @@ class GyroWatch {
 
   // Against the camera and at rest: that of the filter follows a place that may be wrong.
   double bias_rps_ = 0;
-  static constexpr double kNoBiasRps = 1e-2;  // what nobody knows of it
-  double bias_variance_ = kNoBiasRps * kNoBiasRps;
+  double bias_variance_ = kGyroBiasSigmaRps * kGyroBiasSigmaRps;
 
   core::Repeated rate_;
   bool has_turned_ = false;            // an IMU without a gyro says 0 all the time

@@ -40,14 +40,14 @@ Hypotheses::Hypotheses(const FusionParameters* parameters, const OdometerScales&
                        std::shared_ptr<const track::Path> path, int64_t stamp_ns)
     : parameters_(parameters),
       main_(parameters, scales, std::move(path), stamp_ns),
-      rivals_{Rival{Source::camera, {}, {}, {}, {}}, Rival{Source::wheel, {}, {}, {}, {}},
-              Rival{Source::imu, {}, {}, {}, {}}, Rival{Source::gnss, {}, {}, {}, {}}} {}
+      rivals_{Rival{.without = Source::camera}, Rival{.without = Source::wheel}, Rival{.without = Source::imu},
+              Rival{.without = Source::gnss}} {}
 
 void Hypotheses::apply(const Event& event) {
   fix_fitted_.reset();
   const auto* fix = std::get_if<FixInput>(&event);
   if (fix != nullptr && fix->kind != FixKind::track) {
-    apply_fix(*fix, event);
+    apply_fix(event);
   } else {
     apply_to_all(event);
   }
@@ -77,13 +77,12 @@ void Hypotheses::give_place_up(Against because) {
   }
 }
 
-void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
+void Hypotheses::apply_fix(const Event& event) {
+  const auto& fix = std::get<FixInput>(event);
   predict_to(fix.stamp_ns);
   Estimator before = main_;
   const Sides most = most_excess();
-  main_.contradicted_by(std::max(most.behind_m, most.ahead_m));
-  main_.apply(event);
-  main_.contradicted_by(0);
+  main_.apply(event, {.excess_m = std::max(most.behind_m, most.ahead_m)});
   const bool judged = main_.fix_used() || main_.fix_refused();
   const bool unexpected = main_.fix_unexpected();
   if (judged && fix.kind == FixKind::landmark && !main_.fix_again())
@@ -93,7 +92,7 @@ void Hypotheses::apply_fix(const FixInput& fix, const Event& event) {
     if (!doubter.leaves_out(fix)) doubter.estimator.apply(event);
   }
   for (auto& rival : rivals_) {
-    if (rival.estimator) rival.estimator->apply_unwidened(event);
+    if (rival.estimator) rival.estimator->apply(event, {.unwidened = true});
   }
   if (judged) fix_fitted_ = main_.fix_used() && !main_.fix_corrected();
   if (main_.fix_refused()) {
@@ -202,7 +201,7 @@ bool Hypotheses::adopt_by_fix(const FixInput& fix, const Estimator& before, cons
   }
   const bool two_odometers = main_.watch(Source::camera).seen_ns != 0 && main_.watch(Source::wheel).seen_ns != 0;
   if (only == nullptr || !two_odometers) return false;
-  adopt(*only);
+  adopt(*only, without_faulty(*only));
   // The fixes that were not sure are no surer now.
   doubters_ = doubters;
   doubters_.push_back({before, fix.landmark, fix.kind == FixKind::curvature});

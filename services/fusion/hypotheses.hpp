@@ -79,22 +79,22 @@ class Hypotheses {
   };
   struct Rival {
     Source without;
-    std::optional<Estimator> estimator;  // from the source's first sample on; until then it is the main one
-    Sides excess;                        // so far the interval must reach beyond the main one's ends for it
-    Sides carried;                       // when it came back
-    Sides unseen;                        // so far it may have been from the main one while it was away
-    bool asked = false;                  // its word counts at present
-    int64_t asked_ns = 0;                // ... and counted last
-    bool contradicted = false;           // itself, while it was not asked
-    int64_t proven_since_ns = 0;         // two sensors have agreed in it since then; 0 = they do not
-    double faster_mps = 0;               // than the main one, when it was asked last
-    int64_t excess_ns = 0;               // its excess is of then
+    std::optional<Estimator> estimator{};  // from the source's first sample on; until then it is the main one
+    Sides excess{};                        // so far the interval must reach beyond the main one's ends for it
+    Sides carried{};                       // when it came back
+    Sides unseen{};                        // so far it may have been from the main one while it was away
+    bool asked = false;                    // its word counts at present
+    int64_t asked_ns = 0;                  // ... and counted last
+    bool contradicted = false;             // itself, while it was not asked
+    int64_t proven_since_ns = 0;           // two sensors have agreed in it since then; 0 = they do not
+    double faster_mps = 0;                 // than the main one, when it was asked last
+    int64_t excess_ns = 0;                 // its excess is of then
 
     void forget_excess() { excess = carried = unseen = {}; }
   };
 
   void apply_to_all(const Event& event);
-  void apply_fix(const FixInput& fix, const Event& event);
+  void apply_fix(const Event& event);
   bool adopt_by_fix(const FixInput& fix, const Estimator& before, const std::vector<Doubter>& doubters);
   bool adopt_doubter(const FixInput& fix, std::vector<Doubter> before);
   [[nodiscard]] std::vector<Doubter> without_two(const FixInput& fix, const std::vector<Doubter>& before) const;
@@ -105,7 +105,9 @@ class Hypotheses {
   /// The main one is confirmed; `unexpected`: by a fix that was no small way from where it had been expected.
   void confirm_rivals(bool unexpected);
   void exclude_faulty();
-  void adopt(Rival& rival);
+  [[nodiscard]] Estimator without_faulty(const Rival& rival) const;
+  /// It becomes the main one as `next`.
+  void adopt(Rival& rival, Estimator next);
   void take_along(Doubter& doubter, const Estimator& next) const;
   void begin_rival(Source source);
   void ask_rivals();

@@ -34,15 +34,21 @@ void Hypotheses::exclude_faulty() {
   if (proven == nullptr || consistent > 1 || main_.is_consistent()) return;
   // Nothing is left to prove when that sensor alone is isolated.
   if (main_.is_consistent(1U << static_cast<unsigned>(proven->without))) return;
-  adopt(*proven);
-}
-
-void Hypotheses::adopt(Rival& rival) {
-  Estimator next = *rival.estimator;
-  next.exclude(rival.without, main_);
+  const Estimator next = without_faulty(*proven);
   for (auto& doubter : doubters_) {
     if (!doubter.estimator.is_consistent()) take_along(doubter, next);
   }
+  adopt(*proven, next);
+}
+
+// What the rival knows, with the sensor that it does without found to be wrong.
+Estimator Hypotheses::without_faulty(const Rival& rival) const {
+  Estimator next = *rival.estimator;
+  next.exclude(rival.without, main_);
+  return next;
+}
+
+void Hypotheses::adopt(Rival& rival, Estimator next) {
   Sides said = rival.carried;
   said.add(rival.unseen);
   next.doubt_place(said);

@@ -31,7 +31,7 @@ void degrade(TrainEstimate& estimate, double lag_s) {
 }  // namespace
 
 void LagRoom::begin_with(const std::optional<CameraLag::Lag>& before, const FusionParameters& parameters) {
-  if (before && std::abs(before->s) < parameters.camera_lag_s) before_ = before;
+  if (before && std::abs(before->late_s) < parameters.camera_lag_s) before_ = before;
 }
 
 void LagRoom::add(const OdometryInput& step) {
@@ -40,19 +40,19 @@ void LagRoom::add(const OdometryInput& step) {
 }
 
 bool LagRoom::fits_before(const CameraLag::Lag& measured) const {
-  return before_ && std::abs(measured.s - before_->s) < 2 * measured.sigma_s;
+  return before_ && std::abs(measured.late_s - before_->late_s) < 2 * measured.sigma_s;
 }
 
 std::optional<CameraLag::Lag> LagRoom::lag() const {
   const auto measured = measured_.lag();
   if (!measured || measured->sigma_s <= kTripSigmaS || !fits_before(*measured)) return measured;
-  return CameraLag::Lag{before_->s, std::hypot(before_->sigma_s, kTripSigmaS)};
+  return CameraLag::Lag{before_->late_s, std::hypot(before_->sigma_s, kTripSigmaS)};
 }
 
 std::optional<CameraLag::Lag> LagRoom::to_keep(const FusionParameters& parameters) const {
   const auto measured = measured_.lag();
   if (measured && measured->sigma_s < kKnownS)
-    return std::abs(measured->s) < parameters.camera_lag_s ? measured : std::nullopt;
+    return std::abs(measured->late_s) < parameters.camera_lag_s ? measured : std::nullopt;
   return !measured || fits_before(*measured) ? before_ : std::nullopt;
 }
 
@@ -82,15 +82,15 @@ void LagRoom::widen(TrainEstimate& estimate, const FusionParameters& p) {
   const auto held = begins_with_the_wheel(estimate) ? std::optional(CameraLag::unknown()) : lag();
   if (!held) return;
   const double spread_s = 2 * held->sigma_s;
-  const bool is_sure = std::abs(held->s) > std::max(p.camera_lag_s + spread_s, kSure * held->sigma_s);
+  const bool is_sure = std::abs(held->late_s) > std::max(p.camera_lag_s + spread_s, kSure * held->sigma_s);
   const double bare_over_m = estimate.over_m;
   const double bare_under_m = estimate.under_m;
   const double allowed_m = p.allowed_m(estimate.since_sure_m);
   const bool has_width_to_lose = std::max(bare_over_m, bare_under_m) <= allowed_m;
   // Stamps that are late so much, or early where it is below 0: the train is further on, or not so far.
   const auto hold = [&](double late_s) {
-    const bool is_likely =
-        is_sure || (late_s > 0 ? held->s > kLikelyLate * held->sigma_s : -held->s > kLikelyEarly * held->sigma_s);
+    const bool is_likely = is_sure || (late_s > 0 ? held->late_s > kLikelyLate * held->sigma_s
+                                                  : -held->late_s > kLikelyEarly * held->sigma_s);
     const bool is_bounded = !is_likely && has_width_to_lose && estimate.integrity != Integrity::unusable;
     const double most_m = is_bounded ? allowed_m : std::numeric_limits<double>::infinity();
     const auto [behind_m, ahead_m] = std::minmax({late_s * speeds.slowest_mps, late_s * speeds.fastest_mps});
@@ -100,10 +100,10 @@ void LagRoom::widen(TrainEstimate& estimate, const FusionParameters& p) {
     estimate.under_m = std::max(estimate.under_m, std::min(under_m, most_m));
   };
   const double room_s = is_sure ? 0 : p.camera_lag_s;  // what every interval has
-  if (const double late_s = held->s + spread_s - room_s; late_s > 0) hold(late_s);
-  if (const double early_s = spread_s - held->s - room_s; early_s > 0) hold(-early_s);
+  if (const double late_s = held->late_s + spread_s - room_s; late_s > 0) hold(late_s);
+  if (const double early_s = spread_s - held->late_s - room_s; early_s > 0) hold(-early_s);
   estimate.judge_width(p);
-  if (is_sure) degrade(estimate, held->s);
+  if (is_sure) degrade(estimate, held->late_s);
 }
 
 }  // namespace railfix::fusion

@@ -19,6 +19,7 @@ constexpr int kRecentClones = 2;  // pictures before this one that the next step
 constexpr double kUnknownPositionM = 1e5;
 constexpr double kUnknownSpeedMps = 60.0;
 constexpr double kLongestStepS = 0.1;
+constexpr double kGyroBiasWalk2 = 1e-10;  // (rad/s)^2 a second: it changes by 0.6 mrad/s in an hour
 
 double squared(double value) {
   return value * value;
@@ -32,7 +33,7 @@ MotionFilter::MotionFilter(const FusionParameters& parameters, const OdometerSca
   StateVector sigma(kCore);
   sigma << 0.0, 0.0, origin_known ? parameters.start_sigma_m : kUnknownPositionM, kUnknownSpeedMps,
       parameters.acceleration_sigma_mps2, parameters.accel_bias_sigma_mps2, scales.camera_sigma, scales.wheel_sigma,
-      kUnknownPositionM, 0.01, parameters.shape_error_sigma_m, 1.0;
+      kUnknownPositionM, kGyroBiasSigmaRps, parameters.shape_error_sigma_m, 1.0;
   ud_ = estimation::UdFilter(StateVector(sigma.cwiseAbs2()));
 }
 
@@ -133,7 +134,7 @@ void MotionFilter::step(double dt_s, const FusionParameters& p) {
       {StateIndex::other_scale, m.other_noise},
       {StateIndex::camera_odometer, squared(p.visual_creep) * way_m},
       {StateIndex::wheel_odometer, squared(p.wheel_creep) * way_m},
-      {StateIndex::gyro_bias, 1e-10 * dt_s},
+      {StateIndex::gyro_bias, kGyroBiasWalk2 * dt_s},
       {StateIndex::shape_error, squared(p.shape_error_sigma_m) * (1 - squared(m.shape_keep))},
       {StateIndex::gnss_error, 1 - squared(m.gnss_keep)}};
   constexpr int kNoises = static_cast<int>(std::size(noises));
@@ -189,7 +190,7 @@ void MotionFilter::clone_now(int64_t keep_ns) {
 Offer MotionFilter::offer_step(int64_t reference_stamp_ns, double step_m, double sigma_m, double gate) {
   const auto clone = clone_index(reference_stamp_ns);
   if (!clone) return {};
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::camera_odometer)) = 1;
   h(*clone) = -1;
   return offer(h, step_m - (value(StateIndex::camera_odometer) - x_(*clone)), sigma_m, gate);
@@ -197,7 +198,7 @@ Offer MotionFilter::offer_step(int64_t reference_stamp_ns, double step_m, double
 
 Offer MotionFilter::offer_speed(double speed_mps, double sigma_mps, double gate) {
   const double per_camera = 1 / to_unit(Odometer::camera);
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::speed)) = per_camera;
   if (unit_ == Odometer::wheel) {
     h(index(StateIndex::other_scale)) = -value(StateIndex::speed) * squared(per_camera);
@@ -206,20 +207,20 @@ Offer MotionFilter::offer_speed(double speed_mps, double sigma_mps, double gate)
 }
 
 Offer MotionFilter::offer_wheel(double wheel_m, double sigma_m, double gate) {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::wheel_odometer)) = 1;
   return offer(h, wheel_m - value(StateIndex::wheel_odometer), sigma_m, gate);
 }
 
 Offer MotionFilter::offer_acceleration(double accel_mps2, double sigma_mps2, double gate) {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::acceleration)) = 1;
   h(index(StateIndex::accel_bias)) = 1;
   return offer(h, accel_mps2 - value(StateIndex::acceleration) - value(StateIndex::accel_bias), sigma_mps2, gate);
 }
 
 Offer MotionFilter::offer_position(const MeasuredPlace& place, double gate) {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::distance)) = 1;
   h(index(StateIndex::origin)) = 1;
   double expected_m = path_distance_m();
@@ -240,7 +241,7 @@ Offer MotionFilter::test_position(double path_distance_m, double sigma_m, double
 Offer MotionFilter::offer_yaw_rate(double rate_rps, double curvature_per_m, double curvature_rate_per_m2,
                                    double sigma_rps, double gate) {
   const double speed_mps = this->speed_mps();
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::distance)) = speed_mps * curvature_rate_per_m2;
   h(index(StateIndex::origin)) = speed_mps * curvature_rate_per_m2;
   h(index(StateIndex::shape_error)) = speed_mps * curvature_rate_per_m2;
@@ -349,7 +350,7 @@ double MotionFilter::sigma(StateIndex state) const {
 }
 
 double MotionFilter::path_sigma_m() const {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::distance)) = 1;
   h(index(StateIndex::origin)) = 1;
   return std::sqrt(ud_.variance(h));
@@ -360,7 +361,7 @@ double MotionFilter::to_unit(Odometer odometer) const {
 }
 
 StateVector MotionFilter::scale_row(Odometer odometer) const {
-  StateVector h = row();
+  StateVector h = zero_row();
   h(index(StateIndex::unit_scale)) = 1;
   if (odometer != unit_) h(index(StateIndex::other_scale)) = 1;
   return h;
@@ -385,7 +386,7 @@ std::optional<int> MotionFilter::clone_index(int64_t stamp_ns) const {
   return static_cast<int>(it - clones_.begin());
 }
 
-StateVector MotionFilter::row() const {
+StateVector MotionFilter::zero_row() const {
   return StateVector::Zero(x_.size());
 }
 

@@ -50,8 +50,8 @@ struct MeasuredPlace {
 /// Result of offering one measurement.
 struct Offer {
   bool used = false;
-  double residual = 0;
-  double nis = 0;
+  double residual = 0;  // in the measurement's unit
+  double nis = 0;       // its square, in variances
 };
 
 /// A plain value: copies of it are the snapshots from which late measurements are replayed.
@@ -130,7 +130,7 @@ class MotionFilter {
   [[nodiscard]] int index(StateIndex state) const { return static_cast<int>(clones_.size()) + static_cast<int>(state); }
   [[nodiscard]] std::optional<int> clone_index(int64_t stamp_ns) const;
   [[nodiscard]] double unit_scale() const { return 1 + value(StateIndex::unit_scale); }
-  [[nodiscard]] estimation::StateVector row() const;
+  [[nodiscard]] estimation::StateVector zero_row() const;
   [[nodiscard]] estimation::StateVector scale_row(Odometer odometer) const;
   /// One step of time: what of every state is kept, and what it adds to others.
   struct Prediction {

@@ -45,7 +45,7 @@ bool possible(const SavedScales& saved) {
   return std::abs(s.camera) < kLargestError && std::abs(s.wheel) < kLargestError && sigma_possible(s.camera_sigma) &&
          sigma_possible(s.wheel_sigma) && std::abs(s.correlation) < 1 && saved.stamp_ns >= 0 &&
          saved.pulses_per_metre >= 0 &&
-         (!saved.camera_lag || (std::abs(saved.camera_lag->s) < kLargestLagS && saved.camera_lag->sigma_s > 0));
+         (!saved.camera_lag || (std::abs(saved.camera_lag->late_s) < kLargestLagS && saved.camera_lag->sigma_s > 0));
 }
 
 double aged_sigma(double sigma, double trip_sigma, double days, const FusionParameters& p, double unlearnt_sigma) {
@@ -72,7 +72,7 @@ std::string to_text(const SavedScales& saved) {
   std::snprintf(line, sizeof line, "pulses_per_metre: %.17g\n", saved.pulses_per_metre);
   text += line;
   if (saved.camera_lag) {
-    std::snprintf(line, sizeof line, "camera_lag_s: %.6g\ncamera_lag_sigma_s: %.6g\n", saved.camera_lag->s,
+    std::snprintf(line, sizeof line, "camera_lag_s: %.6g\ncamera_lag_sigma_s: %.6g\n", saved.camera_lag->late_s,
                   saved.camera_lag->sigma_s);
     text += line;
   }
@@ -95,7 +95,7 @@ core::Result<SavedScales> saved_scales(const std::string& text) {
   number("stamp_ns", saved.stamp_ns);
   if (values["camera_lag_s"].IsDefined()) {
     saved.camera_lag.emplace();
-    number("camera_lag_s", saved.camera_lag->s);
+    number("camera_lag_s", saved.camera_lag->late_s);
     number("camera_lag_sigma_s", saved.camera_lag->sigma_s);
   }
   const YAML::Node camera_id = values["camera_id"];

@@ -1,7 +1,7 @@
 // Has the train's acceleration changed from one moment to the next? An emergency brake, a stop: no filter of ordinary
 // driving believes it, so that every sensor seems to contradict at once, and it is the filter that is wrong. A sensor
 // that is refused and that such a change would explain calls; when a second one calls for the same direction, or when
-// it is the only odometer that measures the motion, it is right.
+// it is an odometer and no other sensor has agreed for 0.3 s, it is right.
 #pragma once
 
 #include <array>

@@ -16,10 +16,8 @@ constexpr double kRailsFreshS = 0.5;
 constexpr double kShortestStepM = 0.05;
 constexpr double kTrackEveryS = 1.0;      // the track is said again after this time ...
 constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this way
-constexpr double kNoCameraS = 0.5;        // without an odometry step
 constexpr double kCountM = 20.0;
 constexpr double kCreepMps = 0.3;     // slower than that the sign of a speed may be its noise
-constexpr double kLostS = 30.0;       // after so long unseen the track is chosen anew
 constexpr double kWorthSaying = 0.5;  // probability of the track beside
 constexpr double kRateShare = 0.75;   // of the curvature's sigma comes from its unknown rate
 
@@ -91,6 +89,7 @@ void MapMatcher::restart() {
   searched_ns_ = 0;
   shaped_ns_ = 0;
   matched_m_ = 0;
+  unseen_m_ = 0;
 }
 
 PlaceFixes MapMatcher::add(const StateInput& state) {
@@ -206,27 +205,6 @@ void MapMatcher::match_shape(const StepInput& step, PlaceFixes& fixes) {
   match_shape(step.stamp_ns, fixes);
 }
 
-// The gyro tells the shape then, along fusion's way. Where it does not, what came before cannot be joined to what
-// comes.
-void MapMatcher::match_shape_without_camera(int64_t to_ns, PlaceFixes& fixes) {
-  const double since_s = core::seconds(to_ns - shaped_ns_);
-  const bool goes_on = std::abs(since_s) < FollowedPath::kOldStateS;  // otherwise the clock was set, or nobody measured
-  if (goes_on && since_s <= 0) return;
-  const auto turn = goes_on ? turn_of_gyro(shaped_ns_, to_ns) : std::nullopt;
-  shaped_ns_ = to_ns;
-  if (!turn) {
-    curvature_->forget();
-    if (exits_) exits_->forget();
-    return;
-  }
-  unseen_m_ += turn->way_m;
-  if (std::abs(turn->way_m) > parameters_.least_speed_mps * turn->duration_s) {
-    curvature_->add(shape_m(), *turn);
-    if (exits_) exits_->add(shape_m() - 0.5 * turn->way_m, turn->turn_rad / turn->way_m, CurvatureOf::body);
-  }
-  match_shape(to_ns, fixes);
-}
-
 void MapMatcher::match_shape(int64_t stamp_ns, PlaceFixes& fixes) {
   // The exit of a curve is a minimum, which would be missed between.
   if (!exits_ && std::abs(shape_m() - matched_m_) < parameters_.match_every_m) return;
@@ -243,19 +221,6 @@ std::optional<Turn> MapMatcher::turn_of_camera() const {
   return turn;
 }
 
-std::optional<Turn> MapMatcher::turn_of_gyro(int64_t from_ns, int64_t to_ns) const {
-  if (!state_ || !std::isfinite(state_->placed.speed_mps)) return std::nullopt;
-  if (std::abs(core::seconds(to_ns - state_->placed.stamp_ns)) > FollowedPath::kOldStateS) return std::nullopt;
-  auto turn = gyro_.between(from_ns, to_ns);
-  if (turn) turn->way_m = state_->placed.speed_mps * core::seconds(to_ns - from_ns);
-  return turn;
-}
-
-// Odometry says something of each picture, blind or not.
-bool MapMatcher::has_pictures() const {
-  return step_ && std::abs(core::seconds(state_->placed.stamp_ns - step_->stamp_ns)) < kNoCameraS;
-}
-
 void MapMatcher::search(const StepInput& step, PlaceFixes& fixes) {
   auto turn = turn_of_camera();
   if (!turn && step_ && core::seconds(step.stamp_ns - step_->stamp_ns) < FollowedPath::kOldStateS)
@@ -266,15 +231,6 @@ void MapMatcher::search(const StepInput& step, PlaceFixes& fixes) {
 void MapMatcher::search_by(const std::optional<Turn>& turn, int64_t stamp_ns, PlaceFixes& fixes) {
   const auto places = search_.move(turn);
   if (!places.empty()) fixes.push_back(fix_of(FixKind::network, stamp_ns, places));
-}
-
-// By gyro and fusion's speed. Behind a longer silence the way begins anew.
-void MapMatcher::search_without_camera(PlaceFixes& fixes) {
-  const int64_t stamp_ns = state_->placed.stamp_ns;
-  const int64_t from_ns = std::exchange(searched_ns_, stamp_ns);
-  if (has_pictures()) return;
-  if (from_ns == 0 || stamp_ns <= from_ns || core::seconds(stamp_ns - from_ns) > FollowedPath::kOldStateS) return;
-  search_by(turn_of_gyro(from_ns, stamp_ns), stamp_ns, fixes);
 }
 
 // The odometer is fusion's, which runs on by whatever sensor there is.
@@ -316,35 +272,8 @@ TrackWindow MapMatcher::window_at(const Prior& prior) const {
           .stands = !(std::abs(speed_mps) > kCreepMps)};
 }
 
-// Without a camera fusion's states lead: they come ten times a second.
-void MapMatcher::follow_without_camera(PlaceFixes& fixes) {
-  const int64_t stamp_ns = state_->placed.stamp_ns;
-  if (!prior_at(stamp_ns)) return;
-  move_without_camera(stamp_ns);
-  say_track(fixes);
-}
-
 void MapMatcher::move(const Turn& turn, int64_t to_ns) {
   if (std::abs(turn.way_m) > kLeastWayM) chooser_->move(turn);
-  moved_ns_ = to_ns;
-}
-
-// From where the chooser has come to, whoever had led it there.
-void MapMatcher::move_without_camera(int64_t to_ns) {
-  const double dt_s = core::seconds(to_ns - moved_ns_);
-  // A clock that was set back leaves it in the future.
-  if (moved_ns_ == 0 || dt_s > kLostS || dt_s < -FollowedPath::kOldStateS) {
-    if (moved_ns_ != 0) chooser_.emplace(parameters_.track_parameters(), map_, ways_);
-    moved_ns_ = to_ns;
-    return;
-  }
-  const double speed_mps = state_->placed.speed_mps;
-  if (dt_s <= 0 || !std::isfinite(speed_mps)) return;
-  if (const auto turn = turn_of_gyro(moved_ns_, to_ns)) {
-    move(*turn, to_ns);
-    return;
-  }
-  chooser_->move_blind(speed_mps * dt_s);
   moved_ns_ = to_ns;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/time.hpp"
 #include "tpr_publisher/balise_tracker.hpp"
 #include "tpr_publisher/held_doubt.hpp"
 #include "tpr_publisher/position_report.hpp"
@@ -79,6 +80,8 @@ class TprPublisher {
   [[nodiscard]] std::string undeclared() const;
 
  private:
+  static constexpr int64_t kMostAheadNs = core::kNsPerSecond;  // the on-board unit's clock
+
   void follow(const TrainPosition& position);
   void follow_motion(const TrainPosition& position, const std::optional<TrainPosition>& before);
   void hear_cab(ActiveCab cab);

@@ -17,7 +17,7 @@ constexpr double kWayM = 100.0;     // over which GNSS and odometer must agree, 
 constexpr double kOffM = 10.0;      // ... to this and
 constexpr double kOffShare = 0.05;
 constexpr double kRocksM = 2.0;      // a train that stands or begins to move
-constexpr double kStandsM = 1.0;     // since the last position: it takes that one's place
+constexpr double kStandsM = 1.0;     // since the last position but one: it takes the last one's place
 constexpr double kAlongRad = 0.5;    // of the track that is the train's: the way may be a bend
 constexpr double kCrossesRad = 1.2;  // ... and one that turns more off is no track that the train may be on
 constexpr double kAbeamM = 0.1;      // what is further ahead or behind lies beyond the edge's end
@@ -38,9 +38,9 @@ bool GnssSearch::add(const GnssPosition& position, double odometer_m, double spe
   const double reach_m = std::max(p.bound_m, p.interval_factor * p.sigma_m * position.hdop);
   Seen seen{position, odometer_m, 0, reach_m, p.lag_s * std::abs(speed_mps)};
   if (!seen_.empty()) {
-    const double moved_m = std::abs(odometer_m - seen_.back().odometer_m);
-    seen.run_m = seen_.back().run_m + moved_m;
-    if (seen_.size() > 1 && moved_m < kStandsM) seen_.pop_back();
+    const auto moved_m = [&](const Seen& since) { return std::abs(odometer_m - since.odometer_m); };
+    seen.run_m = seen_.back().run_m + moved_m(seen_.back());
+    if (seen_.size() > 1 && moved_m(*std::next(seen_.rbegin())) < kStandsM) seen_.pop_back();
   }
   seen_.push_back(seen);
   const auto is_left = [&] { return std::abs(odometer_m - seen_[1].odometer_m) >= kWayM; };

@@ -31,11 +31,11 @@ struct LocatorParameters {
 
   /// Worse than that the track is another one, or the map is wrong.
   [[nodiscard]] double most_misfit() const { return std::max(2.0, certain_misfit); }
-  /// Likelihood of a sighting so far from a mapped landmark.
-  [[nodiscard]] double mark_density(double off_m) const {
+  /// Likelihood of a sighting so far from a mapped landmark, where the place is known to rough_m.
+  [[nodiscard]] double mark_density(double off_m, double rough_m) const {
     constexpr double kSigmaM = 4.0;
-    const double z = off_m / kSigmaM;
-    return std::abs(z) > 6 ? 0.0 : detection * std::exp(-0.5 * z * z) / (kSigmaM * 2.5066);
+    const double z = std::max(0.0, std::abs(off_m) - rough_m) / kSigmaM;
+    return z > 6 ? 0.0 : detection * std::exp(-0.5 * z * z) / (kSigmaM * 2.5066);
   }
 };
 
@@ -98,6 +98,10 @@ struct TurnSum {
 
 /// Tracks within that of each other, in about the same direction, lie beside each other.
 inline constexpr double kBesideM = 40.0;
+inline constexpr double kParallelRad = 0.3;
+
+/// A place or way whose log likelihood is so far below the best one is given up.
+inline constexpr double kFarBelow = 30.0;
 
 /// How well turns and landmarks of a mapped way fit the measured ones.
 class TurnModel {
@@ -156,9 +160,7 @@ class TurnModel {
   /// Likelihood of a sighted landmark: begins with that of a false one, and each mapped one adds to it. The place is
   /// known to rough_m.
   [[nodiscard]] double of_false_mark() const { return parameters_.false_per_m; }
-  [[nodiscard]] double of_mark(double off_m, double rough_m) const {
-    return parameters_.mark_density(std::max(0.0, std::abs(off_m) - rough_m));
-  }
+  [[nodiscard]] double of_mark(double off_m, double rough_m) const { return parameters_.mark_density(off_m, rough_m); }
   [[nodiscard]] const MeasuredWay& way() const { return way_; }
   [[nodiscard]] const LocatorParameters& parameters() const { return parameters_; }
 

@@ -8,7 +8,6 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kParallelRad = 0.3;
 constexpr int kParts = 8;  // of a cell, to integrate the curvature
 
 }  // namespace

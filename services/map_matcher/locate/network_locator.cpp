@@ -188,7 +188,7 @@ double NetworkLocator::beside_probability(const std::vector<LocatedPlace>& place
   for (const auto& place : places) {
     const auto pose = pose_of(place);
     const bool beside = std::hypot(pose.easting_m - at.easting_m, pose.northing_m - at.northing_m) < kBesideM &&
-                        std::abs(core::wrap_pi(pose.heading_rad - at.heading_rad)) < 0.3;
+                        std::abs(core::wrap_pi(pose.heading_rad - at.heading_rad)) < kParallelRad;
     if (beside) sum += place.probability;
   }
   return sum;

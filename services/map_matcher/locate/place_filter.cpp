@@ -16,7 +16,6 @@ constexpr float kLeastLookM = 10.0F;  // about the place, for how the heading ch
 constexpr float kMostLookM = 60.0F;
 constexpr float kBeyondM = 100.0F;     // of the end of the track
 constexpr float kMostSquared = 25.0F;  // beyond it is a kink that the map does not have
-constexpr double kFarBelow = 30.0;     // a log likelihood that is so far below the best one is given up
 constexpr double kLikelyBelow = 20.0;
 constexpr double kExpectedLog = -0.75;  // of a block at the right place, and less
 constexpr float kSameM = 20.0F;
@@ -276,7 +275,7 @@ void PlaceFilter::weigh_marks(Place& place, const Trail& trail, const Block& blo
     const auto look = [&](uint32_t run, double begin_m) {
       for (const Mark& mapped : index_->marks_on(run)) {
         const double off_m = mapped.along_m + begin_m - at_m;
-        if (alike(seen, mapped)) likelihood += parameters_.mark_density(std::max(0.0, std::abs(off_m) - rough_m));
+        if (alike(seen, mapped)) likelihood += parameters_.mark_density(off_m, rough_m);
       }
     };
     for (size_t i = 0; i < trail.size; ++i) look(trail.legs[i].run, trail.legs[i].begin_m);

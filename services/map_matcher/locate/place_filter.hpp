@@ -1,7 +1,8 @@
 // The first step of the search on the whole network: every place of every edge in both directions is a hypothesis that
 // follows the train from block to block of 100 m, through every leg of every switch, and estimates with an extended
 // Kalman filter of four states where along the track it is and the errors of odometer and gyro. What falls far below
-// the best one is dropped; nothing else is, so what is left are all places that may be the one.
+// the best one is dropped, and a way of more than 12 edges within a block; nothing else is, so what is left are all
+// places that may be the one.
 #pragma once
 
 #include <array>

@@ -8,7 +8,6 @@
 namespace railfix::map_matcher {
 namespace {
 
-constexpr double kFarBelow = 30.0;  // a way whose log likelihood is so far below the best one is given up
 constexpr std::array<double, 3> kScales = {0, -2.0 / 3, 2.0 / 3};  // of the range
 constexpr double kRoughM = 20.0;
 constexpr double kLeastRoughScale = 0.001;
@@ -37,7 +36,7 @@ void add(const WayFit& fit, std::vector<WayFit>& fits) {
   }
 }
 
-/// Ways that were fitted already: stretches and scales lead to the same one again and again.
+/// Ways that were fitted already: several candidates and scales lead to the same one.
 class FittedWays {
  public:
   explicit FittedWays(size_t bins) : bins_(static_cast<double>(bins)) {}
@@ -134,7 +133,7 @@ ComparedWays WayComparison::compare(const std::vector<Candidate>& candidates) {
   return compared;
 }
 
-// The tracks beside the best place are compared too: no stretch needs to have found them.
+// The tracks beside the best place are compared too: the filter need not have kept them.
 bool WayComparison::add_beside(std::vector<WayFit>& fits) {
   if (fits.empty()) return true;
   const WayFit best = best_of(fits);

@@ -256,7 +256,6 @@ std::optional<Fix> CurvatureMatcher::match(int64_t stamp_ns, double odometer_m, 
     waiting_sigma_m_ = sigma_m;
     return std::nullopt;
   }
-  waiting_sigma_m_ = 0;
   forget();
   return Fix{stamp_ns, prior.path_distance_m + peak.offset_m, sigma_m, peak.probability, 0};
 }

@@ -34,6 +34,21 @@ double apart_m(const track::Map& map, const track::EdgePosition& a, const track:
   return std::hypot(at(a).easting_m - at(b).easting_m, at(a).northing_m - at(b).northing_m);
 }
 
+/// Of places, best first, the furthest to either side that are not the best one; without the last ones, which are not
+/// worth saying as long as they are so improbable together.
+std::vector<TrackOption> furthest_places(std::vector<TrackOption> places) {
+  double neglected = 0;
+  while (places.size() > 1 && (neglected += places.back().probability) < 1 - track::kDeclaredProbability)
+    places.pop_back();
+  const auto [least, most] =
+      std::ranges::minmax_element(places, {}, [](const TrackOption& option) { return option.place.offset_m; });
+  std::vector<TrackOption> furthest;
+  for (const auto& one : {least, most}) {
+    if (one != places.begin()) furthest.push_back(*one);
+  }
+  return furthest;
+}
+
 }  // namespace
 
 void TrackChooser::start(const TrackWindow& window) {
@@ -338,6 +353,16 @@ std::optional<TrackChoice> TrackChooser::choice() const {
     return TrackChoice{
         {{hypotheses_.front().route.position_at(place_m_), told_}}, {}, told_ >= track::kDeclaredProbability};
   }
+  const auto tracks = weigh_tracks();
+  if (tracks.empty()) return std::nullopt;
+  TrackChoice choice;
+  for (const auto& track : tracks) choice.options.push_back({track.places.front().place, track.probability});
+  choice.elsewhere = furthest_places(tracks.front().places);
+  choice.known = choice.options.front().probability >= track::kDeclaredProbability;
+  return choice;
+}
+
+std::vector<TrackChooser::WeighedTrack> TrackChooser::weigh_tracks() const {
   struct Place {
     track::EdgePosition place;
     double log = -INFINITY;
@@ -361,30 +386,20 @@ std::optional<TrackChoice> TrackChooser::choice() const {
     mine.log = log_sum(mine.log, log);
     sum = log_sum(sum, log);
   }
-  if (tracks.empty()) return std::nullopt;
   std::vector<Track> sorted;
   for (auto& [edge, track] : tracks) {
     std::ranges::sort(track.places, std::ranges::greater{}, &Place::log);
     sorted.push_back(std::move(track));
   }
   std::ranges::stable_sort(sorted, std::ranges::greater{}, &Track::log);
-  const auto option = [&](const Place& place, double log) {
-    return TrackOption{place.place, told_ * std::exp(log - all)};
-  };
-  TrackChoice choice;
-  for (const auto& track : sorted) choice.options.push_back(option(track.places.front(), track.log));
-  // The furthest ones to either side of all that together are not to be neglected.
-  auto& places = sorted.front().places;
-  double neglected = 0;
-  while (places.size() > 1 &&
-         (neglected += option(places.back(), places.back().log).probability) < 1 - track::kDeclaredProbability)
-    places.pop_back();
-  const auto [least, most] = std::ranges::minmax_element(places, {}, [](const Place& p) { return p.place.offset_m; });
-  for (const auto& furthest : {least, most}) {
-    if (furthest != places.begin()) choice.elsewhere.push_back(option(*furthest, furthest->log));
+  const auto probability = [&](double log) { return told_ * std::exp(log - all); };
+  std::vector<WeighedTrack> weighed;
+  for (const auto& track : sorted) {
+    auto& [places, sum] = weighed.emplace_back();
+    for (const auto& place : track.places) places.push_back({place.place, probability(place.log)});
+    sum = probability(track.log);
   }
-  choice.known = choice.options.front().probability >= track::kDeclaredProbability;
-  return choice;
+  return weighed;
 }
 
 }  // namespace railfix::map_matcher

@@ -56,7 +56,7 @@ class TrackChooser {
   void sight(const Sighting& sighting);
   /// The curvature of the rails in a picture taken here (left positive).
   void see(double curvature_per_m, double sigma_per_m);
-  /// Nothing before the first window, and where every way has ended.
+  /// Nothing before the first window, and where each of several ways has ended.
   [[nodiscard]] std::optional<TrackChoice> choice() const;
   /// How probable it is that the train runs over this landmark, or over one that is alike at the same place of another
   /// way; 1 where no way has it, or there is but one.
@@ -107,6 +107,13 @@ class TrackChooser {
   /// Of what lies between the rails that the train runs on.
   void use_sure(const std::vector<double>& log_fits);
   void run_pictures(double way_m);
+  /// A track where the train may be: the places there, best first, and the probability of them all.
+  struct WeighedTrack {
+    std::vector<TrackOption> places;
+    double probability = 0;
+  };
+  /// Best first; nothing where every way has ended.
+  [[nodiscard]] std::vector<WeighedTrack> weigh_tracks() const;
   /// Logarithm of prior and all evidence.
   [[nodiscard]] double evidence(const Hypothesis& hypothesis) const;
   [[nodiscard]] double of_turning(const Hypothesis& hypothesis) const;

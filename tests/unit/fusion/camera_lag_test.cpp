@@ -47,7 +47,7 @@ double from_rest(double t_s) {
 TEST(CameraLag, IsKnownSoonAfterTheDeparture) {
   for (const double lag_s : {-0.1, 0.0, 0.03, 0.3}) {
     const auto lag = measured(lag_s, 15, from_rest, from_rest);
-    EXPECT_NEAR(lag.s, lag_s, 0.01) << lag_s;
+    EXPECT_NEAR(lag.late_s, lag_s, 0.01) << lag_s;
     EXPECT_LT(lag.sigma_s, 0.02) << lag_s;
   }
 }
@@ -55,7 +55,7 @@ TEST(CameraLag, IsKnownSoonAfterTheDeparture) {
 TEST(CameraLag, ThatIsLongerThanUsualIsKnownLater) {
   for (const double lag_s : {-0.8, 0.6, 0.8, 1.2}) {
     const auto lag = measured(lag_s, 29, from_rest, from_rest);
-    EXPECT_NEAR(lag.s, lag_s, 0.03) << lag_s;
+    EXPECT_NEAR(lag.late_s, lag_s, 0.03) << lag_s;
     EXPECT_LT(lag.sigma_s, 0.05) << lag_s;
   }
 }
@@ -79,7 +79,7 @@ TEST(CameraLag, OfClocksThatRunApartIsLessAndLessKnown) {
     before_ns = stamp_ns;
     if (t < 60) continue;
     const auto lag = watch.lag().value();
-    ASSERT_LT(std::abs(kApart * t - lag.s), 2 * lag.sigma_s) << t;
+    ASSERT_LT(std::abs(kApart * t - lag.late_s), 2 * lag.sigma_s) << t;
   }
 }
 
@@ -87,12 +87,12 @@ TEST(CameraLag, AWheelThatCreepsUnderTractionIsNoLag) {
   const Way creeping = [](double t_s) {
     return t_s < 30 ? 1.01 * from_rest(t_s) : 1.01 * from_rest(30) + 21 * (t_s - 30);
   };
-  EXPECT_LT(std::abs(measured(0, 40, from_rest, creeping).s), 0.02);
+  EXPECT_LT(std::abs(measured(0, 40, from_rest, creeping).late_s), 0.02);
 }
 
 TEST(CameraLag, AWheelThatSlipsIsNoLag) {
   const Way slipping = [](double t_s) { return from_rest(t_s) + 2.0 * std::clamp(t_s - 12, 0.0, 5.0); };
-  EXPECT_LT(std::abs(measured(0, 60, from_rest, slipping).s), 0.02);
+  EXPECT_LT(std::abs(measured(0, 60, from_rest, slipping).late_s), 0.02);
 }
 
 TEST(CameraLag, AWheelThatIsStuckTellsNothing) {
@@ -126,7 +126,7 @@ OdometryInput jumped(double t_s, OdometryInput step, double jump_s) {
 TEST(CameraLag, ThatChangesOnTheWayIsKnownAtOnce) {
   for (const double jump_s : {-0.25, -0.04, 0.03, 0.05, 0.2}) {
     const auto lag = measured_on_the_way([&](double t, const OdometryInput& step) { return jumped(t, step, jump_s); });
-    EXPECT_NEAR(lag.s, jump_s, 0.01) << jump_s;
+    EXPECT_NEAR(lag.late_s, jump_s, 0.01) << jump_s;
     EXPECT_LT(lag.sigma_s, 0.06) << jump_s;
   }
 }
@@ -135,7 +135,7 @@ TEST(CameraLag, ThatMayHaveChangedInASilenceIsNoLongerKnown) {
   const auto lag = measured_on_the_way([](double t, const OdometryInput& step) {
     return t >= kJumpsAtS && t < kJumpsAtS + 3 ? std::nullopt : std::optional(jumped(t, step, 0.2));
   });
-  EXPECT_GT(lag.s + 2 * lag.sigma_s, 0.2);
+  EXPECT_GT(lag.late_s + 2 * lag.sigma_s, 0.2);
 }
 
 TEST(CameraLag, ThatMayHaveChangedUnseenIsNoLongerKnown) {
@@ -144,7 +144,7 @@ TEST(CameraLag, ThatMayHaveChangedUnseenIsNoLongerKnown) {
     sent.valid = t < kJumpsAtS - 2 || t > kJumpsAtS + 2;
     return std::optional(sent);
   });
-  EXPECT_GT(lag.s + 2 * lag.sigma_s, 0.13);
+  EXPECT_GT(lag.late_s + 2 * lag.sigma_s, 0.13);
 }
 
 TEST(CameraLag, PicturesThatAreLeftOutOrWrongAreNoChange) {
@@ -157,14 +157,14 @@ TEST(CameraLag, PicturesThatAreLeftOutOrWrongAreNoChange) {
     last = is_left_out ? step : OdometryInput{};
     return is_left_out ? std::nullopt : std::optional(step);
   });
-  EXPECT_NEAR(left_out.s, 0, 0.01);
+  EXPECT_NEAR(left_out.late_s, 0, 0.01);
   const auto all_sent = measured_on_the_way([](double, const OdometryInput& step) { return std::optional(step); });
   EXPECT_LT(left_out.sigma_s, 1.1 * all_sent.sigma_s);
   const auto wrong = measured_on_the_way([](double t, OdometryInput step) {
     if (std::fmod(t, 3.0) < 0.04) step.step_m += 0.6;
     return std::optional(step);
   });
-  EXPECT_NEAR(wrong.s, 0, 0.02);
+  EXPECT_NEAR(wrong.late_s, 0, 0.02);
   EXPECT_LT(wrong.sigma_s, 0.02);
 }
 
@@ -248,7 +248,7 @@ TEST(CameraLag, OfAnEarlierTripIsForgottenWhereItIsAnotherNow) {
   const auto ride = begun_at_speed(late_by(0.2));
   SavedScales saved{{.camera_sigma = 0.01, .wheel_sigma = 0.01}, ride.stamp_ns(0), "", 0, CameraLag::Lag{0.001, 0.004}};
   auto fusion = core::value_or_throw(Fusion::create({}, ride.map, ride.start(), saved));
-  EXPECT_NEAR(fusion.camera_lag().value().s, 0.001, 1e-9);
+  EXPECT_NEAR(fusion.camera_lag().value().late_s, 0.001, 1e-9);
   bool said = false;
   train::judge(ride, fusion, 0, [&](const TrainEstimate& state, double) {
     said = said || state.reason.find("camera stamps 0.2") != std::string::npos;

@@ -23,7 +23,7 @@ TEST(Scales, AreWrittenAndReadAgain) {
   EXPECT_EQ(read.value().camera_id, saved.camera_id);
   EXPECT_EQ(read.value().pulses_per_metre, 100);
   ASSERT_TRUE(read.value().camera_lag);
-  EXPECT_NEAR(read.value().camera_lag->s, 0.03, 1e-9);
+  EXPECT_NEAR(read.value().camera_lag->late_s, 0.03, 1e-9);
   EXPECT_NEAR(read.value().camera_lag->sigma_s, 0.004, 1e-9);
 }
 

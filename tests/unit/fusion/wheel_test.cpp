@@ -41,6 +41,11 @@ class Train {
     const auto forward = track::Direction::forward;
     fusion_->add(FixInput{now(), 1, kStartM + way_m, 0.1, 0.9999, ++landmarks_, FixKind::landmark, forward, nullptr});
   }
+  /// By map_matcher, of what it sights.
+  void say_nowhere() {
+    fusion_->add(FixInput{now(), 1, kStartM + way_m, INFINITY, 0.01, 0, FixKind::track, track::Direction::forward,
+                          nullptr, SightingsFit::nowhere});
+  }
 
   /// Runs so long with this acceleration; every state must hold the train.
   void run(double time_s, double acceleration_mps2 = 0) {
@@ -302,6 +307,29 @@ TEST(Wheel, ThatSlidesMoreAndMoreIsHeldByWhatGnssSays) {
     EXPECT_NE(train.state->integrity, Integrity::ok);
     train.camera = true;  // it sees now, but not what was
     train.run(30);
+  }
+}
+
+// What is sighted fits nowhere because the wheel has slid: the way that is counted on is as wrong as the place was.
+TEST(Wheel, ThatSlidIsHeldByWhatGnssSaidAlsoWhenThePlaceIsGivenUp) {
+  for (const bool imu : {false, true}) {
+    Train train;
+    train.camera = false;
+    train.imu = imu;
+    train.gnss = true;
+    train.run(20, 1);
+    train.run(60);
+    for (int second = 0; second < 80; ++second) {
+      train.slip -= 0.01;
+      train.run(1);
+    }
+    train.slip = 0;
+    for (int second = 0; second < 90; ++second) {
+      train.say_nowhere();
+      train.run(1);
+    }
+    EXPECT_FALSE(train.state->track_known);
+    EXPECT_GT(train.worst_error_m, 700) << imu;
   }
 }
 

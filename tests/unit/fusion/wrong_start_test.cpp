@@ -194,14 +194,16 @@ TEST_F(WrongStart, ThatIsRightIsOkFromTheLandmarkOnByWhichTheMatcherIsSureOrTheF
 }
 
 TEST_F(WrongStart, ThatGnssAgreesWithIsOkFromTheFirstLandmarkOnOrAtOnceWhereGnssIsSharp) {
-  for (const uint8_t fix : {uint8_t{1}, uint8_t{4}}) {
-    fusion_ = fusion_at(900);
-    t_s_ = 0;
-    go(100, [] {});
-    fusion_.add(GnssInput{at(t_s_), 0, told_m(), 1, fix});
-    EXPECT_EQ(go(1000, [] {}).reason, fix == 4 ? "" : kToldAndGnss);
-    fusion_.add(fix_at(t_s_, told_m(), 1));
-    EXPECT_EQ(go(40, [] {}).reason, "");
+  for (const uint8_t fix : {uint8_t{1}, uint8_t{4}, uint8_t{5}}) {
+    for (const double hdop : {0.6, 1.0}) {
+      fusion_ = fusion_at(900);
+      t_s_ = 0;
+      go(100, [] {});
+      fusion_.add(GnssInput{at(t_s_), 0, told_m(), hdop, fix});
+      EXPECT_EQ(go(1000, [] {}).reason, fix == 1 ? kToldAndGnss : "") << int{fix} << " at HDOP " << hdop;
+      fusion_.add(fix_at(t_s_, told_m(), 1));
+      EXPECT_EQ(go(40, [] {}).reason, "");
+    }
   }
 }
 

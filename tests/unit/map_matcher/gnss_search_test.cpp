@@ -78,6 +78,16 @@ TEST(GnssSearch, FindsTheOneTrackAndTheWayThatTheTrainLooks) {
   EXPECT_EQ(back.place()->direction, track::Direction::forward) << "its front still looks north";
 }
 
+// Every metre or more often: positions that are near each other must not take each other's place for ever.
+TEST(GnssSearch, FindsASlowTrainWithAFastReceiver) {
+  for (const double step_m : {0.01, 0.3, 0.5, 0.8, 0.99, 1.01, 2.0, 8.0}) {
+    GnssSearch search({}, std::make_shared<const NetworkIndex>(tracks_at({0})));
+    double way_m = 0;
+    for (; way_m < 500 && !search.place(); way_m += step_m) search.add({2, 300 + way_m, 1}, way_m, 10 * step_m);
+    EXPECT_LT(way_m, 115) << step_m;
+  }
+}
+
 TEST(GnssSearch, CannotTellTracksThatLieBesideEachOther) {
   for (const double beside_m : {4.5, 12.0, 25.0}) {
     Ride ride(tracks_at({0, beside_m}));

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "core/time.hpp"
 #include "unit/map_matcher/fork_map.hpp"
@@ -168,20 +169,20 @@ class ShapeInTheDark : public testing::TestWithParam<bool> {
     map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 0}};
     return map;
   }
-  /// The worst error of the fixes on 1 km, and how many there are. pictures: there are some, all of them blind.
-  std::pair<double, int> ride(bool pictures, bool gyro) {
-    const auto map = line();
+  static MapMatcherParameters without_lag() {
     MapMatcherParameters parameters;
     parameters.lag_m = 0;
-    MapMatcher matcher(parameters, map);
-    const auto& alignment = map->edges.front().alignment;
-    double worst_m = 0;
-    int fixes = 0;
-    for (int i = 1; i * kPeriodS * kSpeedMps < 1000; ++i) {
+    return parameters;
+  }
+  /// What the shape tells. pictures: there are some, all of them blind.
+  PlaceFixes ride(bool pictures, bool gyro) {
+    const auto& alignment = map_->edges.front().alignment;
+    PlaceFixes fixes;
+    for (int i = 1; i * kPeriodS * kSpeedMps < kRideM; ++i) {
       const auto ns = [&](double t_s) { return core::kNsPerSecond + core::to_ns(t_s); };
       for (int k = 1; gyro && k <= 5; ++k) {
         const double t_s = (i - 1 + 0.2 * k) * kPeriodS;
-        matcher.add(GyroInput{kSpeedMps * alignment.at(100 + kSpeedMps * t_s).curvature_per_m + kBiasRps, ns(t_s)});
+        matcher_.add(GyroInput{kSpeedMps * alignment.at(100 + kSpeedMps * t_s).curvature_per_m + kBiasRps, ns(t_s)});
       }
       const double at_m = 100 + kSpeedMps * i * kPeriodS;
       StateInput state;
@@ -192,34 +193,48 @@ class ShapeInTheDark : public testing::TestWithParam<bool> {
       const auto pose = alignment.at(at_m - kOffM).pose;
       state.easting_m = pose.easting_m;
       state.northing_m = pose.northing_m;
-      auto said = matcher.add(state);
+      auto said = matcher_.add(state);
       if (pictures) {
-        const auto more = matcher.add(StepInput{ns(i * kPeriodS), ns((i - 1) * kPeriodS)});
+        const auto more = matcher_.add(StepInput{ns(i * kPeriodS), ns((i - 1) * kPeriodS)});
         said.insert(said.end(), more.begin(), more.end());
       }
-      for (const auto& fix : said) {
-        if (fix.kind != FixKind::curvature) continue;
-        ++fixes;
-        const double error_m = std::abs(fix.options.front().place.offset_m - at_m);
-        EXPECT_LT(error_m, 2 * fix.sigma_m);
-        worst_m = std::max(worst_m, error_m);
-      }
+      std::ranges::copy_if(said, std::back_inserter(fixes),
+                           [](const PlaceFix& fix) { return fix.kind == FixKind::curvature; });
     }
-    return {worst_m, fixes};
+    return fixes;
+  }
+  static double error_m(const PlaceFix& fix) {
+    const double at_m = 100 + kSpeedMps * core::seconds(fix.stamp_ns - core::kNsPerSecond);
+    return fix.options.front().place.offset_m - at_m;
   }
   static constexpr double kArc = 1.0 / 600;
   static constexpr double kOffM = 12;
+  static constexpr double kRideM = 1003;  // no whole number of the matcher's bins
   static constexpr double kBiasRps = 0.002;
+  std::shared_ptr<const track::Map> map_ = line();
+  MapMatcher matcher_{without_lag(), map_};
 };
 
 TEST_P(ShapeInTheDark, IsThatOfTheGyroAlongFusionsWay) {
-  const auto [worst_m, fixes] = ride(GetParam(), true);
-  EXPECT_GE(fixes, 2) << "where the curve begins and where it ends";
-  EXPECT_LT(worst_m, 6);
+  const auto fixes = ride(GetParam(), true);
+  EXPECT_GE(fixes.size(), 2U) << "where the curve begins and where it ends";
+  for (const auto& fix : fixes) EXPECT_LT(std::abs(error_m(fix)), std::min(6.0, 2 * fix.sigma_m));
+}
+
+TEST_P(ShapeInTheDark, IsToldAlikeWhenTheRideIsPlayedOnceMore) {
+  const auto first = ride(GetParam(), true);
+  matcher_.restart();
+  const auto again = ride(GetParam(), true);
+  ASSERT_EQ(first.size(), again.size());
+  for (size_t i = 0; i < first.size(); ++i) {
+    EXPECT_EQ(first[i].stamp_ns, again[i].stamp_ns);
+    EXPECT_EQ(error_m(first[i]), error_m(again[i]));
+    EXPECT_EQ(first[i].sigma_m, again[i].sigma_m);
+  }
 }
 
 TEST_P(ShapeInTheDark, IsNotToldWithoutAGyro) {
-  EXPECT_EQ(ride(GetParam(), false).second, 0);
+  EXPECT_TRUE(ride(GetParam(), false).empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Pictures, ShapeInTheDark, testing::Bool(),

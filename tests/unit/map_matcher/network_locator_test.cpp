@@ -311,7 +311,7 @@ TEST_F(NetworkLocatorTest, ATrackThatIsNotOnTheMapIsNeverCertain) {
   }
 }
 
-TEST_F(NetworkLocatorTest, WhatWasLookedForBeforeIsTakenFromMemoryAndGivesTheSame) {
+TEST_F(NetworkLocatorTest, AskedOftenOrOnceGivesTheSame) {
   const auto index = network_of(lines_);
   const track::Route route({index->map().edge(17), true}, 0, 0);
   const auto once = ride(index, route, 700, 4200, 0.01);
@@ -379,7 +379,7 @@ TEST_F(NetworkLocatorTest, ALandmarkTellsPlacesApartThatBendAlike) {
   EXPECT_TRUE(location.certain()) << to_string(location.doubt);
 }
 
-TEST_F(NetworkLocatorTest, OneStretchAloneIsNotEnoughToBeCertain) {
+TEST_F(NetworkLocatorTest, NineHundredMetresAreNotEnoughToBeCertain) {
   const auto index = network_of(lines_);
   const auto location = ride(index, track::Route({index->map().edge(17), true}, 0, 0), 700, 1600, 0.0);
   EXPECT_FALSE(location.certain());
