@@ -34,11 +34,11 @@ void Hypotheses::exclude_faulty() {
   if (proven == nullptr || consistent > 1 || main_.is_consistent()) return;
   // Nothing is left to prove when that sensor alone is isolated.
   if (main_.is_consistent(1U << static_cast<unsigned>(proven->without))) return;
-  const Estimator next = without_faulty(*proven);
+  Estimator next = without_faulty(*proven);
   for (auto& doubter : doubters_) {
     if (!doubter.estimator.is_consistent()) take_along(doubter, next);
   }
-  adopt(*proven, next);
+  adopt(*proven, std::move(next));
 }
 
 // What the rival knows, with the sensor that it does without found to be wrong.

@@ -108,6 +108,7 @@ void RailSearch::sum(const SlopeGrid& grid, ShiftableRows& rows) const {
 void RailSearch::coarse(int turn) {
   found_.clear();
   best_ = 0;
+  const double middle = farthest_shift_ + 0.5;  // a cast cuts off
   for (const double pitch : pitches_) {
     resample(left_grid_, pitch, left_);
     resample(right_grid_, pitch, right_);
@@ -118,7 +119,6 @@ void RailSearch::coarse(int turn) {
     }
     for (size_t i = static_cast<size_t>(turn % turns_); i < curvatures_.size(); i += static_cast<size_t>(turns_)) {
       const double curvature = curvatures_[i];
-      const double middle = farthest_shift_ + 0.5;  // a cast cuts off
       for (const double yaw : yaws_) {
         for (size_t k = 0; k < shifts_.size(); ++k) {
           const double shift = curvature * shift_per_curvature_[k] - yaw * shift_per_yaw_[k];

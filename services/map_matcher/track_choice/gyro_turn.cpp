@@ -10,9 +10,9 @@ namespace railfix::map_matcher {
 namespace {
 
 constexpr double kHistoryS = 10.0;
+// The same, which a train that runs never feels. Fusion takes its accelerometer for stuck alike.
 constexpr int kStuckRepeats = 9;  // and for ...
-constexpr double kStuckS =
-    0.15;  // ... so long the same, which a train that runs never feels (fusion takes its accelerometer for stuck alike)
+constexpr double kStuckS = 0.15;  // ... so long
 constexpr double kLeastBiasRps = 1e-6;
 constexpr double kScatterS = 0.5;    // over which the scatter is taken
 constexpr double kScattersMore = 2;  // of the variance that is promised: a body's vibration is no noise

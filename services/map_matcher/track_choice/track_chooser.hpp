@@ -112,7 +112,7 @@ class TrackChooser {
     std::vector<TrackOption> places;
     double probability = 0;
   };
-  /// Best first; nothing where every way has ended.
+  /// Best first; nothing where each of several ways has ended.
   [[nodiscard]] std::vector<WeighedTrack> weigh_tracks() const;
   /// Logarithm of prior and all evidence.
   [[nodiscard]] double evidence(const Hypothesis& hypothesis) const;

@@ -37,6 +37,7 @@ struct Arguments {
   double saved_wrong = -1;
   double every_m = 0;
   bool learnt = false;
+  bool map_matcher = false;
   bool list = false;
 };
 
@@ -219,7 +220,7 @@ void add_options(CLI::App& app, Arguments& a) {
   app.add_flag(
       "--sightings", s.sightings,
       "Places come from masts and balises that are sighted, by the real matcher, on a map that is not quite right");
-  app.add_flag("--map-matcher", s.whole_matcher,
+  app.add_flag("--map-matcher", a.map_matcher,
                "... by the whole map_matcher, which chooses the track, too, and searches for a start that nobody told");
   app.add_option("--position", a.position,
                  "What each source is worth, frogs and portals as references: a table of so many runs of 33 km")
@@ -247,13 +248,6 @@ void list_faults() {
   for (const auto& [sensor, kind] : all_faults()) std::cout << to_string(sensor) << ":" << to_string(kind) << "\n";
 }
 
-// What the simulation would say in its place, rightly or wrongly, is left out.
-void give_all_to_map_matcher(Arguments& a) {
-  a.plan.simulation.sightings = true;
-  a.plan.simulation.track_fixes = false;
-  std::erase(a.plan.faults, FaultName{Sensor::fix, FaultKind::wrong_branch});
-}
-
 void fill_plan(Arguments& a) {
   auto& s = a.plan.simulation;
   a.plan.faults = faults_named(a.fault);
@@ -261,7 +255,10 @@ void fill_plan(Arguments& a) {
   if (a.sudden_mps2 > 0) s.style = DriveStyle::sudden(a.sudden_mps2);
   s.style.back_mps = core::mps_from_kmh(a.back_kmh);
   leave_out(s, a.without);
-  if (s.whole_matcher) give_all_to_map_matcher(a);
+  if (a.map_matcher) {
+    leave_to_map_matcher(s);
+    std::erase(a.plan.faults, FaultName{Sensor::fix, FaultKind::wrong_branch});
+  }
   if (s.sightings) s.landmark_spacing_m = 0;
   if (a.saved_wrong >= 0) a.plan.saved_wrong = a.saved_wrong;
   load_map(a);

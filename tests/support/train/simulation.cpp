@@ -56,6 +56,12 @@ SimulationPlan campaign_plan() {
   return plan;
 }
 
+void leave_to_map_matcher(SimulationPlan& plan) {
+  plan.whole_matcher = plan.sightings = true;
+  plan.track_fixes = false;
+  plan.landmark_spacing_m = 0;
+}
+
 uint64_t seed_of_run(uint64_t campaign_seed, uint64_t number) {
   return campaign_seed * 1'000'000 + number;
 }

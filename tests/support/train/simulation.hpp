@@ -60,6 +60,8 @@ struct SimulationPlan {
 
 /// What runs of the confidence campaign have in common.
 SimulationPlan campaign_plan();
+/// The whole map_matcher says all there is to say of the map; the simulation says nothing in its place.
+void leave_to_map_matcher(SimulationPlan& plan);
 /// Seed of one run of a campaign.
 uint64_t seed_of_run(uint64_t campaign_seed, uint64_t number);
 /// What is drawn for that run beside the errors of its sensors.

@@ -22,8 +22,11 @@ WholeMatcher::WholeMatcher(const TrainSimulation& simulation)
 
 template <class Input>
 void WholeMatcher::give(const Input& input) {
-  if (!has_sense(input)) return;
-  for (const auto& fix : matcher_.add(input)) found_.push_back(fusion::input_of(map_matcher::message_of(fix)));
+  if (has_sense(input)) say(matcher_.add(input));
+}
+
+void WholeMatcher::say(const map_matcher::PlaceFixes& fixes) {
+  for (const auto& fix : fixes) found_.push_back(fusion::input_of(map_matcher::message_of(fix)));
 }
 
 void WholeMatcher::feel(const fusion::ImuInput& sample) {
@@ -80,9 +83,7 @@ std::vector<fusion::FixInput> WholeMatcher::see(const fusion::OdometryInput& ste
 
 std::vector<fusion::FixInput> WholeMatcher::run_on(const fusion::TrainEstimate& state, double /*arrival_s*/) {
   const auto input = map_matcher::input_of(fusion::message_of(state));
-  if (!input.track_known || has_sense(input)) {
-    for (const auto& fix : matcher_.add(input)) found_.push_back(fusion::input_of(map_matcher::message_of(fix)));
-  }
+  if (!input.track_known || has_sense(input)) say(matcher_.add(input));
   return found();
 }
 

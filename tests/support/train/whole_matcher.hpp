@@ -28,6 +28,7 @@ class WholeMatcher : public Matching {
   [[nodiscard]] map_matcher::StepInput counted(const fusion::OdometryInput& step, double speed_mps);
   template <class Input>
   void give(const Input& input);
+  void say(const map_matcher::PlaceFixes& fixes);
   void look(const fusion::OdometryInput& step, double speed_mps, double arrival_s);
   std::vector<fusion::FixInput> found() { return std::exchange(found_, {}); }
 

@@ -74,9 +74,7 @@ TEST(Coverage, MapMatcherTellsWhichLegItIs) {
   SimulationPlan plan = train::campaign_plan();
   plan.duration_s = 120;
   plan.switch_spacing_m = 600;
-  plan.track_fixes = false;
-  plan.sightings = plan.whole_matcher = true;
-  plan.landmark_spacing_m = 0;
+  train::leave_to_map_matcher(plan);
   const auto told = run_campaign(plan, 6);
   EXPECT_LE(told.p95_m, 0.5);
   plan.start_told = false;

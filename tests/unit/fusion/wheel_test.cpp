@@ -289,19 +289,25 @@ TEST(Wheel, AloneItAdmitsWhatASlipMayAdd) {
   EXPECT_THAT(train.state->reason, HasSubstr("nothing would see it slip"));
 }
 
-// Each second it turns a little slower: neither an IMU nor its own readings tell. GNSS does, but may be wrong itself.
+/// From 20 m/s on, beside GNSS: each second the wheel turns a little slower, which neither an IMU nor its own readings
+/// tell.
+void slide_more_and_more(Train& train, bool imu, int seconds) {
+  train.camera = false;
+  train.imu = imu;
+  train.gnss = true;
+  train.run(20, 1);
+  train.run(60);
+  for (int second = 0; second < seconds; ++second) {
+    train.slip -= 0.01;
+    train.run(1);
+  }
+}
+
+// GNSS tells, but may be wrong itself.
 TEST(Wheel, ThatSlidesMoreAndMoreIsHeldByWhatGnssSays) {
   for (const bool imu : {false, true}) {
     Train train;
-    train.camera = false;
-    train.imu = imu;
-    train.gnss = true;
-    train.run(20, 1);
-    train.run(60);
-    for (int second = 0; second < 60; ++second) {
-      train.slip -= 0.01;
-      train.run(1);
-    }
+    slide_more_and_more(train, imu, 60);
     EXPECT_GT(train.worst_error_m, 100) << imu;
     EXPECT_THAT(train.state->reason, HasSubstr("GNSS contradicts the position"));
     EXPECT_NE(train.state->integrity, Integrity::ok);
@@ -314,15 +320,7 @@ TEST(Wheel, ThatSlidesMoreAndMoreIsHeldByWhatGnssSays) {
 TEST(Wheel, ThatSlidIsHeldByWhatGnssSaidAlsoWhenThePlaceIsGivenUp) {
   for (const bool imu : {false, true}) {
     Train train;
-    train.camera = false;
-    train.imu = imu;
-    train.gnss = true;
-    train.run(20, 1);
-    train.run(60);
-    for (int second = 0; second < 80; ++second) {
-      train.slip -= 0.01;
-      train.run(1);
-    }
+    slide_more_and_more(train, imu, 80);
     train.slip = 0;
     for (int second = 0; second < 90; ++second) {
       train.say_nowhere();
