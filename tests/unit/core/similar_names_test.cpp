@@ -21,6 +21,7 @@ TEST(SimilarNames, TellAllThatThereAreWhenTheyAreFewOrNoneIsLikeIt) {
   EXPECT_EQ(did_you_mean("cuont", keys), "did you mean count?");
   EXPECT_EQ(did_you_mean("zzzz", keys), "there are: count, limit, map, start, on");
   EXPECT_EQ(did_you_mean("", keys), "there are: count, limit, map, start, on");
+  EXPECT_EQ(did_you_mean("setings", {"train", "settings"}), "did you mean settings?") << "of two, too";
   EXPECT_EQ(did_you_mean("caboose", {"cab", "coach"}), "there are: cab, coach");
 }
 
