@@ -259,7 +259,8 @@ TEST_F(TrainFolder, TheAdviceNamesTheFolderOfTheTrain) {
   EXPECT_EQ(messaging::keys_command(keys), "railfix train keys " + folder_.string());
   const auto missing = messaging::security_properties(keys, "monitor");
   ASSERT_FALSE(missing.ok());
-  EXPECT_THAT(missing.error().message, HasSubstr("make the train's keys with railfix train keys " + folder_.string()));
+  EXPECT_THAT(missing.error().message, HasSubstr("make the train's keys with railfix train keys " + folder_.string() +
+                                                 ", on the computer that has security/authority, and copy"));
 
   const HostFolder installed(folder_ / "host");
   fs::create_directories(installed.generation(1));

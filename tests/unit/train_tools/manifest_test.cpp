@@ -85,6 +85,14 @@ TEST_F(TrainFolder, TheCheckSaysWhatWouldGoWrong) {
   EXPECT_THAT(findings(), Contains(HasSubstr("line.map is missing or cannot be read; put it beside train.yaml")));
 }
 
+TEST_F(TrainFolder, WhatAServiceSaysOnTwoHostsIsToldOnce) {
+  write_map();
+  size_t told = 0;
+  for (const auto& finding : check_train(manifest(kTrain).value(), kNoPrograms).findings)
+    told += finding.text.starts_with("settings of fusion are not checked") ? 1 : 0;
+  EXPECT_EQ(told, 1U) << "it has a standby";
+}
+
 TEST_F(TrainFolder, AStartThatIsNotOnTheMapIsAnError) {
   write_map();  // edge 1 of 1,000 m
   const auto told = [&](const std::string& start, const char* map = "map: line.map") {
