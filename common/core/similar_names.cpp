@@ -47,8 +47,7 @@ std::vector<std::string> similar_names(const std::string& wanted, const std::vec
 }
 
 std::string did_you_mean(const std::string& wanted, const std::vector<std::string>& names) {
-  constexpr size_t kFew = 4;
-  const auto similar = names.size() <= kFew ? std::vector<std::string>{} : similar_names(wanted, names);
+  const auto similar = similar_names(wanted, names);
   return similar.empty() ? "there are: " + joined(names) : "did you mean " + joined(similar) + "?";
 }
 

@@ -50,12 +50,15 @@ core::Result<std::vector<std::string>> addresses_of(const std::vector<std::strin
       if (one.name == wanted || one.address == wanted) addresses.push_back(one.address);
     }
     if (addresses.size() > before) continue;
-    const auto name_of = [](const auto& one) { return one.name + " (" + one.address + ")"; };
     return core::Error{"network interface " + wanted + " is not here or has no IPv4 address; this computer has " +
-                       core::joined(here, name_of)};
+                       interfaces_told()};
   }
   if (std::find(addresses.begin(), addresses.end(), kLoopback) == addresses.end()) addresses.emplace_back(kLoopback);
   return addresses;
+}
+
+std::string interfaces_told() {
+  return core::joined(interfaces_here(), [](const auto& one) { return one.name + " (" + one.address + ")"; });
 }
 
 size_t running_interfaces(const std::vector<std::string>& interfaces) {

@@ -13,6 +13,9 @@ namespace railfix::messaging {
 /// computer does not have or that has no IPv4 address, with the ones that it has.
 core::Result<std::vector<std::string>> addresses_of(const std::vector<std::string>& interfaces);
 
+/// "eth0 (10.42.1.12), lo (127.0.0.1)": what this computer has.
+std::string interfaces_told();
+
 /// How many of these interfaces have a carrier: Fast DDS 2.9 uses no others, and those that come later it never uses.
 size_t running_interfaces(const std::vector<std::string>& interfaces);
 

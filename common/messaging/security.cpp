@@ -73,7 +73,8 @@ core::Result<std::vector<std::pair<std::string, std::string>>> security_properti
     const auto file = std::filesystem::absolute(folder / file_name);
     if (access(file.c_str(), R_OK) != 0) {
       return core::Error{file.string() + " is missing or cannot be read by this user; make the train's keys with " +
-                         keys_command(folder) + " and copy this host's part here"};
+                         keys_command(folder) +
+                         ", on the computer that has security/authority, and copy this host's part here"};
     }
     properties.emplace_back(property, "file://" + file.string());
   }

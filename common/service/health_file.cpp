@@ -52,6 +52,7 @@ void judge_traffic(std::istream& in, int64_t now_ns, HealthAnswer& answer) {
   const auto lately = [&](int64_t at_ns) { return at_ns != 0 && now_ns - at_ns < kFlowGapNs; };
   const bool input_flows = lately(traffic.last_input_ns) && !lately(traffic.input_since_ns);
   answer.stands_by = traffic.stands_by;
+  if (traffic.last_input_ns != 0) answer.input_s = core::seconds(now_ns - traffic.last_input_ns);
   answer.sends = traffic.flow != Flow::sporadic && lately(traffic.last_output_ns);
   answer.stuck = traffic.flow == Flow::answers && !traffic.stands_by && input_flows && !lately(traffic.last_output_ns);
   if (answer.stuck) answer.text = "input comes, nothing goes out: " + answer.text;

@@ -54,10 +54,11 @@ struct HealthAnswer {
   bool starting = false;  // it does not wait for input yet
   bool degraded = false;
   bool stands_by = false;
-  bool sends = false;       // one that sends steadily has done so within the last two seconds
-  bool stuck = false;       // one that answers every input has had input for two seconds and answered none of it
-  std::string text;         // one sentence
-  std::string serves = {};  // address of its page; empty = it has none, or does not say it
+  bool sends = false;  // one that sends steadily has done so within the last two seconds
+  bool stuck = false;  // one that answers every input has had input for two seconds and answered none of it
+  std::optional<double> input_s = {};  // since the last input; nothing before the first
+  std::string text;                    // one sentence
+  std::string serves = {};             // address of its page; empty = it has none, or does not say it
   /// What an operator calls well.
   [[nodiscard]] bool works() const { return healthy && !stuck; }
 };

@@ -1,5 +1,7 @@
 #include "service/yaml_file.hpp"
 
+#include <sstream>
+
 #include "core/whole_file.hpp"
 #include "core/yaml_left_out.hpp"
 
@@ -26,6 +28,18 @@ std::string text_of(const std::filesystem::path& file) {
   return std::move(text).value();
 }
 
+// The first line that a tab indents, which YAML's own error does not say; 0 = none.
+int line_with_tab(const std::string& text) {
+  std::istringstream lines(text);
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const auto indent = line.substr(0, line.find_first_not_of(" \t"));
+    if (indent.size() < line.size() && indent.find('\t') != std::string::npos) return number;
+  }
+  return 0;
+}
+
 }  // namespace
 
 YAML::Node load_yaml(const std::filesystem::path& file) {
@@ -33,14 +47,18 @@ YAML::Node load_yaml(const std::filesystem::path& file) {
 }
 
 core::Result<YAML::Node> read_yaml(const std::filesystem::path& file, const std::string& remedy) {
+  std::string text;
   try {
-    const auto text = text_of(file);
+    text = text_of(file);
     auto node = YAML::Load(text);
     if (const auto whole = core::check_nothing_left_out(text, file.string()); !whole.ok()) return whole.error();
     return node;
   } catch (const YAML::BadFile&) {
     return core::Error{file.string() + " cannot be opened; " + remedy};
   } catch (const YAML::Exception& error) {
+    if (const int line = line_with_tab(text); line > 0)
+      return core::Error{file.string() + " line " + std::to_string(line) +
+                         ": a tab is at the beginning; YAML wants spaces there"};
     return core::Error{file.string() + " line " + std::to_string(error.mark.line + 1) +
                        ": not valid YAML: " + error.msg};
   }

@@ -273,6 +273,7 @@ int calibrate_mount(const MountArguments& arguments) {
 
 void add_calibrate(CLI::App& app, Action& chosen) {
   auto* calibrate = app.add_subcommand("calibrate", "How a camera sits and looks");
+  calibrate->footer("Example: railfix calibrate mount --pictures frames --focal 1390 --out camera.yaml");
   calibrate->require_subcommand(1);
   add_calibrate_lens(*calibrate, chosen);
   auto* mount =

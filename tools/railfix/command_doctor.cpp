@@ -46,7 +46,10 @@ int doctor(const TrainOptions& options) {
   for (auto& finding : check_installed_certificates(HostFolder(options.root))) findings.push_back(std::move(finding));
   for (auto& finding : check_services(options)) findings.push_back(std::move(finding));
   const bool good = say(findings);
-  std::cout << (good ? "this computer can run Railfix\n" : "this computer must not run Railfix like this\n");
+  const std::string no_manifest =
+      " (looked at as any host: its address, releases, map and keys only with --train TRAIN)";
+  std::cout << (good ? "this computer can run Railfix" : "this computer must not run Railfix like this")
+            << (host == nullptr ? no_manifest : "") << '\n';
   return good ? 0 : 1;
 }
 
@@ -55,6 +58,7 @@ int doctor(const TrainOptions& options) {
 void add_doctor(CLI::App& app, Action& chosen) {
   auto options = std::make_shared<TrainOptions>();
   auto* computer = app.add_subcommand("doctor", "Say what is wrong with this computer as a host of a train");
+  computer->footer("Example: railfix doctor --train deploy/trains/re460-042 --host cab");
   computer->add_option("--train", options->train, "Folder of train.yaml");
   computer->add_option("--host", options->host, "Which host of the train this computer is");
   computer->add_option("--root", options->root, "Where var/lib/railfix is")->check(no_file())->capture_default_str();

@@ -201,6 +201,7 @@ void add_make(CLI::App& map, Action& chosen) {
 
 void add_map(CLI::App& app, Action& chosen) {
   CLI::App* map = app.add_subcommand("map", "Build maps of the track and look into them");
+  map->footer("Example: railfix map build line.landxml --out line.map");
   map->require_subcommand(1);
   add_build(*map, chosen);
   add_info(*map, chosen);

@@ -5,6 +5,7 @@ namespace railfix::tool {
 void add_recording(CLI::App& app, Action& chosen) {
   auto* recording =
       app.add_subcommand("recording", "Recordings (MCAP files): look into them, cut, join, export, repair");
+  recording->footer("Example: railfix recording info run.mcap");
   recording->require_subcommand(1);
   add_recording_info(*recording, chosen);
   add_recording_cut(*recording, chosen);

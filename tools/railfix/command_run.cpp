@@ -164,6 +164,10 @@ int run(const RunOptions& options) {
                  "the whole run; why stands in "
               << (options.out / "log" / "recorder.log").string() << '\n';
   }
+  if (interrupted != 0)
+    std::cout << "interrupted after " << supervisor.picture().views
+              << (plan.pictures ? " of " + std::to_string(*plan.pictures) : std::string())
+              << " pictures; the rest is missing in what follows\n";
   std::cout << "tables and recording.mcap are in " << options.out.string() << '\n';
   if (!options.draw.empty()) std::cout << draw_run(options, options.out / "recording.mcap", options.draw) << '\n';
   return interrupted == 0 && whole ? 0 : 1;

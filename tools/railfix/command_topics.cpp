@@ -206,6 +206,7 @@ void add_common(CLI::App& command, TopicsOptions& options) {
 void add_topics(CLI::App& app, Action& chosen) {
   auto options = std::make_shared<TopicsOptions>();
   auto* topics = app.add_subcommand("topics", "Live topics of a train: which there are, how fast, what they say");
+  topics->footer("Example: railfix topics hz train_state --train demo");
   topics->require_subcommand(1);
   const auto add = [&](const char* name, const char* what, int (*run)(const TopicsOptions&), bool one_topic) {
     auto* command = topics->add_subcommand(name, what);

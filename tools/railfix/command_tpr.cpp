@@ -243,6 +243,7 @@ struct TprOptions {
 void add_tpr(CLI::App& app, Action& chosen) {
   auto options = std::make_shared<TprOptions>();
   auto* tpr = app.add_subcommand("tpr", "ETCS train position reports (message 136): bits, ground link, comparison");
+  tpr->footer("Example: railfix tpr decode 880601D6F345402AF34000E48F68EB84D250014010C38830");
   tpr->require_subcommand(1);
   const auto add_baseline = [&](CLI::App* command) {
     command->add_option("--baseline", options->baseline, "Layout: 3 = SUBSET-026 3.x, 4 = 4.0.0")

@@ -13,6 +13,7 @@
 #include "train/check.hpp"
 #include "train/render.hpp"
 #include "train/supervise.hpp"
+#include "train/verdict.hpp"
 
 namespace railfix::tool {
 
@@ -49,8 +50,7 @@ const TrainHost& chosen_host(const Manifest& manifest, const TrainOptions& optio
   if (!options.host.empty())
     throw core::BadInput("--host '" + options.host + "' is no host of train " + manifest.train_id +
                          "; there are: " + names_of(manifest));
-  throw core::BadInput("this computer has the address of no host of train " + manifest.train_id +
-                       "; say which one it is with --host: " + names_of(manifest));
+  throw core::BadInput(manifest.why_no_host_here());
 }
 
 HostPlan plan_here(const TrainOptions& options) {
@@ -77,12 +77,14 @@ int say_status(const TrainOptions& options) {
                               {"down", plan.down},
                               {"services", nlohmann::ordered_json::array()}};
   std::string table;
+  Answers answers;
   std::string page;  // another port than the configured one, when that was taken
   for (const auto& service : plan.services) {
     const auto found = state.find(service.name);
     const RunningService process = found == state.end() || !runs ? RunningService{} : found->second;
     const auto health = health_of(plan, runs ? state : HostState{}, service.name);
     healthy = healthy && health.works();
+    answers[service.name] = health;
     page += health.serves;
     json["services"].push_back({{"service", service.name},
                                 {"release", service.release},
@@ -91,11 +93,12 @@ int say_status(const TrainOptions& options) {
                                 {"pid", process.pid},
                                 {"restarts", process.restarts},
                                 {"healthy", health.works()},
+                                {"stands_by", health.stands_by},
                                 {"text", health.text}});
     char line[256];
     std::snprintf(line, sizeof(line), "%-15s %-10s %10d %8lld %8d  ", service.name.c_str(), service.release.c_str(),
                   service.generation, static_cast<long long>(process.pid), process.restarts);
-    table += line + health.text + (service.standby ? " (configured as standby)" : "") + "\n";
+    table += line + health.text + standby_text(service, health) + "\n";
   }
   if (!page.empty()) json["page"] = page;
   const auto again = "railfix train up " + plan.train() + at_root(options.root);
@@ -110,6 +113,8 @@ int say_status(const TrainOptions& options) {
               << "\n"
               << "service         release    generation      pid restarts  health\n"
               << table << (page.empty() ? "" : "the page is at " + page + "\n");
+    for (const auto& sentence : deaf_services(answers)) std::cout << sentence << '\n';
+    if (const auto others = not_seen_from_here(folder, plan); runs && !others.empty()) std::cout << others << '\n';
   }
   return healthy ? 0 : 1;
 }
@@ -118,6 +123,8 @@ namespace {
 
 // Nothing is asked over the network: each computer knows its own clock, disks, memory and images best.
 void say_not_asked(const Manifest& manifest, const TrainHost* here) {
+  if (here == nullptr)
+    std::cout << "not asked: this computer, which is no host: " << manifest.why_no_host_here() << '\n';
   for (const auto& host : manifest.hosts) {
     if (here != nullptr && host.name == here->name) continue;
     std::cout << "not asked: the computer " << host.name << " (clock, memory, disks, network, releases); type railfix "
@@ -137,7 +144,11 @@ int check(const TrainOptions& options) {
   say_not_asked(manifest, here);
   std::cout << "train " << manifest.train_id << ": " << manifest.services.size() << " services on "
             << manifest.hosts.size() << (manifest.hosts.size() == 1 ? " host" : " hosts") << ", release "
-            << manifest.release << (good ? ", can start" : ", must not start like this") << '\n';
+            << manifest.release
+            << (!good             ? ", must not start like this"
+                : here == nullptr ? ", the manifest has no error; no computer was looked at"
+                                  : ", can start")
+            << '\n';
   return good ? 0 : 1;
 }
 

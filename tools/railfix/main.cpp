@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "commands.hpp"
+#include "core/joined.hpp"
 #include "core/result.hpp"
 #include "core/similar_names.hpp"
 #include "core/whole_file.hpp"
@@ -29,8 +30,10 @@ std::string missing_command(const CLI::App& app) {
   for (const auto* one : at->get_subcommands([](const CLI::App*) { return true; })) names.push_back(one->get_name());
   const auto typed = at->remaining();
   const std::string wanted = typed.empty() ? "" : typed.front();
-  return path + (typed.empty() ? ": a command is missing; " : ": there is no command '" + wanted + "'; ") +
-         railfix::core::did_you_mean(wanted, names);
+  if (typed.empty())
+    return path + ": a command is missing; there are: " + railfix::core::joined(names) + "; " + path +
+           " COMMAND --help explains each";
+  return path + ": there is no command '" + wanted + "'; " + railfix::core::did_you_mean(wanted, names);
 }
 
 /// The same where help is asked for something that is no command, and would be given for the one above it.

@@ -78,6 +78,14 @@ TEST(Help, IsAWordToo) {
   EXPECT_THAT(unknown.err, HasSubstr("there is no command 'maps'"));
 }
 
+TEST(Help, IsPointedToWhereACommandIsMissing) {
+  for (const std::vector<std::string>& typed : {std::vector<std::string>{"railfix"}, {"railfix", "map"}}) {
+    const auto ran = test::run_program(typed, kPatienceS);
+    EXPECT_EQ(ran.exit_code, 2);
+    EXPECT_THAT(ran.err, HasSubstr(typed.back() + " COMMAND --help explains each"));
+  }
+}
+
 TEST(Help, OfACommandThatIsNotThereIsNoneOfTheOneAboveIt) {
   const auto ran = test::run_program({"railfix", "map", "check", "--help"}, kPatienceS);
   EXPECT_EQ(ran.exit_code, 2);

@@ -47,6 +47,23 @@ TEST_F(RunCommand, TwoIntoOneFolderAreNotTaken) {
   expect_refusal(test::run_program(run("pictures", {"--start", "1:1"}), kPatienceS), "--start 1:1 needs a map");
 }
 
+TEST_F(RunCommand, OneThatIsEndedEarlySaysHowFarItCame) {
+  for (int second = 0; second < 300; ++second)
+    write_picture("pictures/" + std::to_string(1000 + second) + ".png", second % 256);
+  test::Program ended(run("pictures", {"--fps", "1", "--pace", "real"}), {root_ / "said", {}, {}});
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatienceS);
+  while (test::slurp(root_ / "said").find("watch it on") == std::string::npos) {
+    ASSERT_FALSE(ended.exit_code()) << test::slurp(root_ / "said");
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ended.end(SIGTERM);
+  EXPECT_EQ(ended.exit_code(), 1);
+  const auto said = test::slurp(root_ / "said");
+  EXPECT_THAT(said, ::testing::ContainsRegex("interrupted after [0-9]+ of 300 pictures; the rest is missing"));
+  EXPECT_THAT(said, ::testing::HasSubstr("tables and recording.mcap are in " + path("out")));
+}
+
 TEST_F(RunCommand, WithoutRoomForItsRecordingItDoesNotBegin) {
   write_picture("pictures/1000.png", 100);
   expect_refusal(

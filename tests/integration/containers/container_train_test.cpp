@@ -210,7 +210,7 @@ TEST_P(ContainerTrain, AnImageThatIsMissingStartsNothing) {
   write_manifest("test-missing", "test");
   const auto up = train(TwoHosts::cab, {"up"});
   EXPECT_EQ(up.exit_code, 1);
-  EXPECT_THAT(up.out, HasSubstr("image railfix/fusion:test-missing is not on this computer; "));
+  EXPECT_THAT(up.out, HasSubstr("not on this computer: image railfix/fusion:test-missing; "));
   EXPECT_EQ(train(TwoHosts::cab, {"status"}).exit_code, 2) << "something was started";
 }
 

@@ -38,7 +38,8 @@ TEST_F(Doctor, SaysWhatIsWrongWithTheTrainThatRunsHere) {
   const auto top = test::run_program({"railfix", "top", "--once", "--train", id_, "--root", root()}, 60);
   EXPECT_EQ(top.exit_code, 0) << "this computer knows its own train's domain and certificates: " << top.err;
   EXPECT_THAT(top.out, HasSubstr("fusion"));
-  EXPECT_THAT(well.out, AllOf(Not(HasSubstr("error: fusion")), Not(HasSubstr(".pem")), Not(HasSubstr("supervisor"))));
+  EXPECT_THAT(well.out, AllOf(Not(HasSubstr("error: fusion")), Not(HasSubstr(".pem")), Not(HasSubstr("supervisor")),
+                              HasSubstr("its address, releases, map and keys only with --train TRAIN")));
 
   // A key that somebody has exchanged on this host.
   const auto security = folder_ / "root/var/lib/railfix-train/generations/1/security";

@@ -124,6 +124,23 @@ TEST_F(Operator, CheckSaysWhichComputersItHasNotAsked) {
   EXPECT_THAT(two.out, Not(HasSubstr("the computer cab ")));
 }
 
+// A manifest is also checked on an office computer: no error, but nothing is promised either.
+TEST_F(Operator, CheckOnNoHostOfTheTrainPromisesNothingAndShowsBothSidesAddresses) {
+  std::ofstream(folder_ / "train/train.yaml")
+      << "train:\n  id: " << id_ << "\n  release: " RAILFIX_TEST_RELEASE "\n  run_as: programs\n  hosts: { "
+      << "cab: { address: 10.99.1.11 }, coach: { address: 10.99.1.12 } }\n  services: { fusion: cab }\n";
+  const auto addresses = "lo (127.0.0.1)";
+  const auto wrong = "; the manifest has cab 10.99.1.11, coach 10.99.1.12: correct `address`, or say with --host";
+  const auto checked = train({"check", manifest()});
+  EXPECT_EQ(checked.exit_code, 0) << checked.out << checked.err;
+  EXPECT_THAT(checked.out, HasSubstr("the manifest has no error; no computer was looked at"));
+  EXPECT_THAT(checked.out, Not(HasSubstr("can start")));
+  for (const auto& told : {checked.out, up().err}) {
+    EXPECT_THAT(told, HasSubstr(addresses));
+    EXPECT_THAT(told, HasSubstr(wrong));
+  }
+}
+
 // What no check can know, such as a camera that another program has: the service ends with exit code 2, again and
 // again.
 TEST_F(Operator, AServiceThatRefusesItsConfigurationIsNotWaitedFor) {

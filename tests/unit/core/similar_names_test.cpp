@@ -16,11 +16,12 @@ TEST(SimilarNames, FindsWhatWasMeant) {
   EXPECT_THAT(similar_names("zzzzzzzzz", names), IsEmpty());
 }
 
-TEST(SimilarNames, TellAllThatThereAreWhenTheyAreFewOrNoneIsLikeIt) {
+TEST(SimilarNames, TellAllThatThereAreWhenNoneIsLikeIt) {
   const std::vector<std::string> keys{"count", "limit", "map", "start", "on"};
   EXPECT_EQ(did_you_mean("cuont", keys), "did you mean count?");
   EXPECT_EQ(did_you_mean("zzzz", keys), "there are: count, limit, map, start, on");
   EXPECT_EQ(did_you_mean("", keys), "there are: count, limit, map, start, on");
+  EXPECT_EQ(did_you_mean("setings", {"train", "settings"}), "did you mean settings?") << "of two, too";
   EXPECT_EQ(did_you_mean("caboose", {"cab", "coach"}), "there are: cab, coach");
 }
 

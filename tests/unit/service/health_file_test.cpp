@@ -28,6 +28,7 @@ TEST(HealthFile, StandsThereAgainWhenTheBuildBeforeTakesItAway) {
   EXPECT_LE(silent, core::monotonic_ns() - asked_ns);
   EXPECT_EQ(ask_health(path).text, "active: as it should be (no input yet, no output yet)");
   EXPECT_EQ(ask_health(path).serves, "");
+  EXPECT_FALSE(ask_health(path).input_s);
   now->write(status, {}, "http://127.0.0.1:8081/");
   EXPECT_EQ(ask_health(path).serves, "http://127.0.0.1:8081/");
   now.reset();
@@ -77,6 +78,7 @@ class HealthFileFlow : public ::testing::Test {
 
 TEST_F(HealthFileFlow, OneThatAnswersNothingIsStuck) {
   const auto answer = ask(Flow::answers, 10, 0.1, 5);
+  EXPECT_NEAR(answer.input_s.value(), 0.1, 0.05);
   EXPECT_TRUE(answer.stuck);
   EXPECT_TRUE(answer.healthy) << "its supervisor leaves it alone";
   EXPECT_FALSE(answer.works()) << "an operator is told";

@@ -147,12 +147,15 @@ TEST_F(TrainFolder, PermissionsThatDoNotFitAreTold) {
     return check_certificates(train, *train.host("coach"));
   };
   EXPECT_THAT(told("12"), IsEmpty());
-  EXPECT_THAT(told("13"), Contains(AllOf(Field(&Finding::error, true),
-                                         Field(&Finding::text, HasSubstr("fusion.permissions.p7s does not allow "
-                                                                         "domain 13; railfix train keys " +
-                                                                         folder_.string() +
-                                                                         " --renew, then railfix "
-                                                                         "train down on every host, then up")))));
+  EXPECT_THAT(told("13"),
+              ElementsAre(AllOf(Field(&Finding::error, true),
+                                Field(&Finding::text, (folder_ / "security/coach").string() +
+                                                          ": 5 of 5 permissions do not allow domain 13 (tool, "
+                                                          "map_matcher, fusion, tpr_publisher, monitor); railfix "
+                                                          "train keys " +
+                                                          folder_.string() +
+                                                          " --renew, then railfix train down on every host, then up"))))
+      << "one mistake, one sentence";
   // As the release before would have made them.
   const auto permissions = folder_ / "security/coach/fusion.permissions.p7s";
   auto before = test::slurp(permissions);
@@ -256,7 +259,8 @@ TEST_F(TrainFolder, TheAdviceNamesTheFolderOfTheTrain) {
   EXPECT_EQ(messaging::keys_command(keys), "railfix train keys " + folder_.string());
   const auto missing = messaging::security_properties(keys, "monitor");
   ASSERT_FALSE(missing.ok());
-  EXPECT_THAT(missing.error().message, HasSubstr("make the train's keys with railfix train keys " + folder_.string()));
+  EXPECT_THAT(missing.error().message, HasSubstr("make the train's keys with railfix train keys " + folder_.string() +
+                                                 ", on the computer that has security/authority, and copy"));
 
   const HostFolder installed(folder_ / "host");
   fs::create_directories(installed.generation(1));

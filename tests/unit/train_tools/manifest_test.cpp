@@ -1,6 +1,7 @@
 // What an operator may write into train.yaml, and what is said of mistakes.
 #include <gmock/gmock.h>
 
+#include "train/containers.hpp"
 #include "train/disk_need.hpp"
 #include "train/roll_out.hpp"
 #include "unit/train_tools/train_folder.hpp"
@@ -34,6 +35,10 @@ TEST_F(TrainFolder, MistakesAreToldWithLineKeyAndWayOut) {
   EXPECT_THAT(told("domain: 12", "domain: 512"), HasSubstr("train.yaml line 3: train.domain must be a whole number"));
   EXPECT_THAT(told("domain: 12", "domian: 12"),
               HasSubstr("line 3: train.domian is not known here; did you mean domain?"));
+  EXPECT_THAT(told("settings:", "setings:"), HasSubstr("setings is not known here; did you mean settings?"));
+  EXPECT_THAT(told("run_as: programs", "security: yess"), HasSubstr("train.security 'yess' is not true or false"));
+  EXPECT_THAT(told("  domain: 12", "\tdomain: 12"),
+              HasSubstr("line 3: a tab is at the beginning; YAML wants spaces there"));
   EXPECT_THAT(
       told("odometry: cab", "odometry: caboose"),
       HasSubstr("train.services.odometry runs on 'caboose', which is no host of this train; there are: cab, coach"));
@@ -80,6 +85,14 @@ TEST_F(TrainFolder, TheCheckSaysWhatWouldGoWrong) {
   EXPECT_THAT(findings(), Contains(HasSubstr("line.map is missing or cannot be read; put it beside train.yaml")));
 }
 
+TEST_F(TrainFolder, WhatAServiceSaysOnTwoHostsIsToldOnce) {
+  write_map();
+  size_t told = 0;
+  for (const auto& finding : check_train(manifest(kTrain).value(), kNoPrograms).findings)
+    told += finding.text.starts_with("settings of fusion are not checked") ? 1 : 0;
+  EXPECT_EQ(told, 1U) << "it has a standby";
+}
+
 TEST_F(TrainFolder, AStartThatIsNotOnTheMapIsAnError) {
   write_map();  // edge 1 of 1,000 m
   const auto told = [&](const std::string& start, const char* map = "map: line.map") {
@@ -108,6 +121,17 @@ TEST_F(TrainFolder, FilesThatNoServiceCouldReadAreTold) {
       << "resolution: [640, 480]\ncamera_model: pinhole\nintrinsics: [600, 600, 320, 240]\n"
          "distortion_model: radial-tangential\ndistortion_coefficients: [0, 0, 0, 0]\n";
   EXPECT_THAT(findings("map: line.map", "map: line.map\n  calibration: camera.yaml"), IsEmpty());
+}
+
+TEST_F(TrainFolder, ALiveCameraWithoutCalibrationIsTold) {
+  write_map();
+  const auto told = [&](const std::string& settings) {
+    return findings("settings:\n", "settings:\n  frame_grabber: { " + settings + " }\n");
+  };
+  for (const char* live : {"source: 'genicam:any'", "source: 'capture:/dev/video0'"})
+    EXPECT_THAT(told(live), Contains(StartsWith("train.calibration is empty: focal length and height of the camera")));
+  EXPECT_THAT(told("source: /data/ride"), IsEmpty()) << "it lies beside the pictures";
+  EXPECT_THAT(told("source: 'genicam:any', calibration: /data/camera.yaml"), IsEmpty());
 }
 
 TEST_F(TrainFolder, DataThatAreToBePlayedAndAreNotOnTheComputerAreTold) {
@@ -159,6 +183,21 @@ TEST_F(TrainFolder, SourcesThatAreNotGivenAreTold) {
               Not(HasSubstr("is not given")));
 }
 
+TEST_F(TrainFolder, ImagesThatAreMissingAreToldInOneSentenceWithBothWaysOut) {
+  if (geteuid() != 0) GTEST_SKIP() << "containers are root's";
+  const auto engine = folder_ / "podman";
+  std::ofstream(engine) << "#!/bin/sh\n[ \"$1\" = info ]\n";  // it works, and has no image
+  fs::permissions(engine, fs::perms::owner_all);
+  const std::string usual = getenv("PATH");
+  setenv("PATH", (folder_.string() + ":" + usual).c_str(), 1);
+  const auto train = manifest(kTrain, "run_as: programs", "run_as: podman").value();
+  const auto told = container_problems(train, *train.host("coach"));
+  setenv("PATH", usual.c_str(), 1);
+  EXPECT_THAT(told, ElementsAre(AllOf(StartsWith("not on this computer: images railfix/map-matcher:1.2.0, "),
+                                      HasSubstr("railfix/monitor:1.2.0; " + engine.string() + " load --input"),
+                                      HasSubstr("or set train.run_as to programs"))));
+}
+
 TEST_F(TrainFolder, AnotherTrainThanTheOneThatRunsHereIsTold) {
   const auto train = manifest(kTrain).value();
   const HostFolder here(folder_);
@@ -180,7 +219,7 @@ TEST_F(TrainFolder, AnotherTrainThanTheOneThatRunsHereIsTold) {
 }
 
 // An operator begins with a copy of one.
-TEST(Examples, HaveNothingMissingButTheirKeys) {
+TEST(Examples, HaveNothingMissingButTheirKeysAndWords) {
   const fs::path trains = fs::path(RAILFIX_SOURCE_DIR) / "deploy/trains";
   const auto problems = [&](const std::string& train) {
     std::vector<std::string> texts;
@@ -189,7 +228,12 @@ TEST(Examples, HaveNothingMissingButTheirKeys) {
     }
     return texts;
   };
-  EXPECT_THAT(problems("am843-017"), IsEmpty()) << "the complete one";
+  const std::string ground = "settings.tpr_publisher.ground_link.";
+  EXPECT_THAT(problems("am843-017"),
+              ElementsAre(StartsWith(ground + "broker: ground.example:8883 is the example's"),
+                          AllOf(StartsWith(ground + "password_file: "), HasSubstr("holds the example's password")),
+                          AllOf(StartsWith("settings.monitor.token_file: "), HasSubstr("holds the example's word"))))
+      << "the complete one: nothing but what only its owner knows";
   const auto missing = problems("re460-042");
   EXPECT_THAT(missing, Contains(HasSubstr("security/cab is missing; make the train's certificates")));
   EXPECT_THAT(missing, Not(Contains(HasSubstr("source is not given"))));

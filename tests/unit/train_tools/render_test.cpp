@@ -5,6 +5,7 @@
 
 #include "support/program.hpp"
 #include "train/containers.hpp"
+#include "train/disk_need.hpp"
 #include "train/render.hpp"
 #include "unit/train_tools/train_folder.hpp"
 
@@ -106,6 +107,19 @@ TEST_F(TrainFolder, ThePageIsOnTheTrainNetworkOnly) {
   write_map();
   const auto train = manifest(kTrain).value();
   EXPECT_THAT(render_config(train, *train.host("coach"), "FOLDER"), HasSubstr("address: 10.42.1.12"));
+}
+
+// Services run in HostFolder::home(), which is below --root.
+TEST_F(TrainFolder, RecordingsLieBelowTheFolderThatServicesRunIn) {
+  write_map();
+  const auto folder = [&](const Manifest& train) {
+    return YAML::Load(render_config(train, *train.host("cab"), "FOLDER"))["recorder"]["folder"].Scalar();
+  };
+  EXPECT_EQ(folder(manifest(kTrain).value()), "recordings");
+  EXPECT_EQ(folder(manifest(kTrain, "settings:\n", "settings:\n  recorder: { folder: /data }\n").value()), "/data");
+  const auto needs = disk_needs(manifest(kTrain).value(), *manifest(kTrain).value().host("cab"), folder_);
+  EXPECT_TRUE(std::ranges::any_of(
+      needs, [&](const auto& need) { return need.folder == HostFolder(folder_).home() / "recordings"; }));
 }
 
 TEST_F(TrainFolder, AContainerIsLockedDownAndSeesNoKeysButItsOwn) {

@@ -22,6 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// As in deploy/trains.
+constexpr const char* kExamplePassword = "the-password-of-this-train-at-the-broker";
+constexpr const char* kExampleWord = "a-word-of-your-own";
+
 // Full pictures stay in the memory of one host.
 void check_placement(const Manifest& manifest, Findings& findings) {
   const auto* camera = manifest.service("frame_grabber");
@@ -128,6 +132,25 @@ void check_ground_link(const Manifest& manifest, Findings& findings) {
                           "password_file, or certificate_file and key_file");
 }
 
+// Copied from an example and never filled in. Everybody can read these words.
+void check_placeholders(const Manifest& manifest, Findings& findings) {
+  const auto broker = setting_of(manifest.settings, "tpr_publisher", "ground_link.broker");
+  if (broker.substr(0, broker.rfind(':')).ends_with(".example"))
+    warning(findings, "settings.tpr_publisher.ground_link.broker: " + broker +
+                          " is the example's, and no such broker is anywhere; give the address of yours");
+  for (const auto& file : setting_files(manifest)) {
+    const bool is_word = file.key == "token_file";
+    if (!is_word && file.key != "ground_link.password_file") continue;
+    const auto text = core::read_whole(manifest.folder / file.file);
+    if (!text.ok()) continue;  // told already
+    const auto word = text.value().substr(0, text.value().find('\n'));
+    if (word != (is_word ? kExampleWord : kExamplePassword)) continue;
+    warning(findings, "settings." + file.service + "." + file.key + ": " + (manifest.folder / file.file).string() +
+                          " holds the example's " + (is_word ? "word" : "password") +
+                          ", which everybody can read; put one of your own there");
+  }
+}
+
 // A page that is not on this computer alone lets nobody control without a token.
 void check_control(const Manifest& manifest, Findings& findings) {
   const auto of = [&](const char* key) { return setting_of(manifest.settings, "monitor", key); };
@@ -137,6 +160,20 @@ void check_control(const Manifest& manifest, Findings& findings) {
   warning(findings,
           "settings.monitor: nobody can control recorder and player from the page, because there is no token; put a "
           "word into a file beside train.yaml and name it in token_file, or set control to false");
+}
+
+bool is_live_camera(const std::string& source) {
+  return source.starts_with("genicam:") || source.starts_with("capture:");
+}
+
+// Nothing that was recorded lies beside a live camera: not even the focal length is known.
+void check_calibration(const Manifest& manifest, Findings& findings) {
+  const auto of = [&](const char* key) { return setting_of(manifest.settings, "frame_grabber", key); };
+  if (manifest.service("frame_grabber") == nullptr || !is_live_camera(of("source"))) return;
+  if (!manifest.calibration.empty() || !of("calibration").empty()) return;
+  warning(findings,
+          "train.calibration is empty: focal length and height of the camera are guessed, and no distance can be "
+          "trusted; railfix calibrate lens, then mount, make the file");
 }
 
 // Settings that are right for a run of recorded data and wrong for a train.
@@ -154,7 +191,9 @@ void check_settings(const Manifest& manifest, Findings& findings) {
     warning(findings,
             "settings.monitor.address is 0.0.0.0: page and metrics are open to every network that the computer is in; "
             "leave it out, and they are on the train network only");
+  check_calibration(manifest, findings);
   check_ground_link(manifest, findings);
+  check_placeholders(manifest, findings);
   check_control(manifest, findings);
   const auto* camera = manifest.service("frame_grabber");
   const auto* recorder = manifest.service("recorder");
@@ -264,7 +303,7 @@ void check_services(const Manifest& manifest, const FindProgram& find_program, T
   }
   for (auto& asked : answers) {
     auto answer = asked.get();
-    if (answer.finding) check.findings.push_back(*std::move(answer.finding));
+    if (answer.finding) add_once(check.findings, *std::move(answer.finding));
     check.made_of[answer.service] = std::move(answer.made_of);
   }
   for (const auto& config : configs) fs::remove(config, failed);

@@ -1,6 +1,8 @@
 // Certificates, keys and permissions of a train: what is missing, runs out, or was made for another manifest.
 #include <unistd.h>
 
+#include <map>
+
 #include "core/joined.hpp"
 #include "messaging/security.hpp"
 #include "train/findings.hpp"
@@ -104,14 +106,17 @@ void check_named_files(const YAML::Node& settings, const fs::path& folder, const
   check_named_keys(settings, folder, service, findings);
 }
 
+/// What permissions do not allow, and of which services.
+using Forbidden = std::map<std::string, std::vector<std::string>>;
+
 /// Permissions that were made before the train got another domain or name let nobody in (and no upgrade would bring it
 /// there, because old and new services do not hear each other); those of a release whose service used fewer topics
 /// leave a topic silent.
 void check_permissions(const Manifest& manifest, const std::string& host, const std::string& service,
-                       const fs::path& file, const Remedies& remedies, Findings& findings) {
+                       const fs::path& file, const Remedies& remedies, Forbidden& forbidden, Findings& findings) {
   const auto missing = missing_rights(manifest, service, host, file);
   if (!missing.train.empty()) {
-    add_once(findings, {true, file.string() + " does not allow " + core::joined(missing.train) + remedies.renew_train});
+    forbidden[core::joined(missing.train)].push_back(service);
   } else if (!missing.topics.empty()) {
     add_once(findings,
              {false, file.string() + " does not allow what " + service +
@@ -128,10 +133,15 @@ void check_keys(const Manifest& manifest, const TrainHost& host, Findings& findi
   std::vector<std::string> services{kOperator};
   for (const auto& service : services_on(manifest, host.name)) services.push_back(service.name);
   const Remedies remedies(manifest.typed());
+  Forbidden forbidden;
   for (const auto& service : services) {
     if (check_identity(folder, service, warning_days(manifest.settings), remedies, findings))
-      check_permissions(manifest, host.name, service, folder / (service + ".permissions.p7s"), remedies, findings);
+      check_permissions(manifest, host.name, service, folder / (service + ".permissions.p7s"), remedies, forbidden,
+                        findings);
   }
+  for (const auto& [what, of] : forbidden)
+    error(findings, folder.string() + ": " + std::to_string(of.size()) + " of " + std::to_string(services.size()) +
+                        " permissions do not allow " + what + " (" + core::joined(of) + ")" + remedies.renew_train);
 }
 
 }  // namespace

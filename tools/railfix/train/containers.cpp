@@ -6,6 +6,7 @@
 #include <map>
 #include <sstream>
 
+#include "core/joined.hpp"
 #include "messaging/security.hpp"
 #include "service/service.hpp"
 #include "train/render.hpp"
@@ -198,18 +199,18 @@ std::vector<std::string> container_problems(const Manifest& manifest, const Trai
   if (geteuid() != 0) return {"containers of a train are started by root: use sudo"};
   if (const auto answer = run({engine.value(), "info"}); answer.exit_code != 0)
     return {engine.value() + " does not work here: " + last_line(answer.text)};
-  std::vector<std::string> problems;
   std::vector<std::string> images;
+  std::vector<std::string> missing;
   for (const auto& service : services_on(manifest, host.name)) {
     const auto image = image_of(service);
-    if (image_id(engine.value(), image)) {
-      images.push_back(image);
-    } else {
-      problems.push_back("image " + image + " is not on this computer; " + engine.value() +
-                         " load --input the release's archive, or build it with ./dev images");
-    }
+    (image_id(engine.value(), image) ? images : missing).push_back(image);
   }
-  if (!problems.empty() || images.empty()) return problems;
+  if (!missing.empty())
+    return {"not on this computer: " + std::string(missing.size() == 1 ? "image " : "images ") + core::joined(missing) +
+            "; " + engine.value() + " load --input the release's archive brings them (./dev images builds them), or " +
+            "set train.run_as to programs, which the package railfix-RELEASE has"};
+  if (images.empty()) return {};
+  std::vector<std::string> problems;
   check_topics(engine.value(), images, problems);
   // One of them with everything that can go wrong with an engine: init, limits, capabilities.
   Container trial;

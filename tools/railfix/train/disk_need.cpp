@@ -51,7 +51,7 @@ double megabytes_in(const fs::path& folder, const std::string& in_name) {
 // What is recorded already needs no more room. The recorder stops where only keep_free_mb are left.
 void add_recordings(const Host& host, std::vector<DiskNeed>& needs) {
   const auto given = setting_of(host.settings, "recorder", "folder");
-  const auto folder = host.place(given.empty() ? std::string(kContainerHome) + "/recordings" : given);
+  const auto folder = host.place(given.empty() ? std::string(kUsualRecordings) : given);
   const double quota_mb = host.number("recorder", "quota_mb", 0);
   const double missing_mb = (quota_mb > 0 ? quota_mb : kRecordingsMb) - megabytes_in(folder, ".mcap");
   if (missing_mb <= 0) return;

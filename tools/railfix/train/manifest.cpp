@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <initializer_list>
 
+#include "core/joined.hpp"
 #include "core/shell_word.hpp"
 #include "core/similar_names.hpp"
 #include "messaging/network.hpp"
@@ -96,7 +97,7 @@ class ManifestReader {
                                                         manifest_.domain < 0 || manifest_.domain > 232))
       problem(domain, "train.domain", "must be a whole number from 0 to 232");
     if (const auto security = train["security"]; security && !YAML::convert<bool>::decode(security, manifest_.security))
-      problem(security, "train.security", "must be true or false");
+      problem(security, "train.security", "'" + text_of(security, "train.security") + "' is not true or false");
   }
 
   void read_hosts(const YAML::Node& hosts, const YAML::Node& train) {
@@ -209,6 +210,12 @@ const TrainHost* Manifest::host_here() const {
     here = &host;
   }
   return here;
+}
+
+std::string Manifest::why_no_host_here() const {
+  return "this computer has " + messaging::interfaces_told() + "; the manifest has " +
+         core::joined(hosts, [](const auto& host) { return host.name + " " + host.address; }) +
+         ": correct `address`, or say with --host which of them this computer is";
 }
 
 const TrainService* Manifest::service(const std::string& name) const {

@@ -44,6 +44,8 @@ struct Manifest {
   [[nodiscard]] const TrainHost* host(const std::string& name) const;
   /// The one whose interface or address this computer has; nullptr when there is none, or more than one.
   [[nodiscard]] const TrainHost* host_here() const;
+  /// Why there is no host_here(), with the addresses of both sides, and what to do.
+  [[nodiscard]] std::string why_no_host_here() const;
   [[nodiscard]] const TrainService* service(const std::string& name) const;
   [[nodiscard]] std::string release_of(const TrainService& service) const;
   /// Its folder as an operator types it.

@@ -53,7 +53,7 @@ YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const st
     fill(settings["frame_grabber"], "calibration", in_folder(folder, manifest.calibration));
   if (manifest.service("recorder") != nullptr) {
     fill(settings["recorder"], "train_file", folder + "/config.yaml");
-    fill(settings["recorder"], "folder", std::string(kContainerHome) + "/recordings");
+    fill(settings["recorder"], "folder", kUsualRecordings);
   }
   // The page is for the train network, not for every other one that this computer is in.
   if (manifest.service("monitor") != nullptr) fill(settings["monitor"], "address", host.address);

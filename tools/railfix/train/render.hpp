@@ -11,6 +11,9 @@
 
 namespace railfix::tool {
 
+/// Where the recorder writes that was told nothing else: in the folder that services run in, so below --root.
+inline constexpr const char* kUsualRecordings = "recordings";
+
 std::vector<HostedService> services_on(const Manifest& manifest, const std::string& host);
 
 /// Of a service, beside its configuration.
