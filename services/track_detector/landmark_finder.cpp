@@ -101,6 +101,7 @@ bool LandmarkFinder::move(const LandmarkPicture& picture) {
     platforms_.forget();
     edges_.forget();
     uprights_.forget();
+    shade_.forget();
     return false;
   }
   speed_mps_ = *step_m / core::seconds(picture.stamp_ns - stamp_ns_);
@@ -108,6 +109,7 @@ bool LandmarkFinder::move(const LandmarkPicture& picture) {
   // The sheet lies at the height of balises, the texture that was followed lower.
   way_m_ +=
       *step_m * (picture.pose.height_m + options_.texture_depth_m) / (picture.pose.height_m + options_.balise_depth_m);
+  shade_.add(view_, maker_->sheet(), way_m_);
   return true;
 }
 
@@ -153,7 +155,8 @@ void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
 void LandmarkFinder::find_uprights(const LandmarkPicture& picture) {
   const auto& found = upright_search_.find(picture);
   const auto& settled = edges_.follow(found, upright_search_.profile(), picture, way_m_);
-  for (const UprightObject& object : uprights_.add(settled, edges_, way_m_, upright_search_.profile().beside_grey)) {
+  for (const UprightObject& object :
+       uprights_.add(settled, edges_, shade_, way_m_, upright_search_.profile().beside_grey)) {
     report(sighting_of(object, way_m_, picture.stamp_ns, options_.way_sigma), picture);
   }
 }

@@ -10,6 +10,7 @@
 #include "track_detector/edge_tracker.hpp"
 #include "track_detector/frog_search.hpp"
 #include "track_detector/ground_motion.hpp"
+#include "track_detector/ground_shade.hpp"
 #include "track_detector/ground_tracker.hpp"
 #include "track_detector/landmark_types.hpp"
 #include "track_detector/plate_search.hpp"
@@ -44,6 +45,7 @@ class LandmarkFinder {
   std::unique_ptr<vision::TopViewMaker> maker_;
   vision::TopView view_;
   GroundMotion motion_;
+  GroundShade shade_;
   double way_m_ = 0;  // run since the beginning, good to a percent
   int64_t stamp_ns_ = 0;
   double speed_mps_ = 0;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "track_detector/edge_tracker.hpp"
+#include "track_detector/ground_shade.hpp"
 #include "track_detector/mast_fit.hpp"
 
 namespace railfix::track_detector {
@@ -30,10 +31,11 @@ struct UprightObject {
 class UprightObjects {
  public:
   UprightObjects();
-  /// Edges that were settled in the picture at way_m, who followed them, and how bright it is beside the track there.
+  /// Edges that were settled in the picture at way_m, who followed them, the ground so far, and how bright it is beside
+  /// the track there.
   /// Gives what is certain now; valid until the next call.
-  const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker, double way_m,
-                                        double beside_grey);
+  const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker,
+                                        const GroundShade& shade, double way_m, double beside_grey);
   void forget();
   /// Behind a portal in that daylight led to, and since then neither a portal out nor daylight for long.
   [[nodiscard]] bool in_tunnel(double way_m) const;
@@ -59,7 +61,8 @@ class UprightObjects {
   void pair_masts();
   void find_stripes(double way_m);
   void tell_mast(const SettledEdge& inner, const MastPlace& at);
-  void pair_sides(double way_m);
+  void pair_sides(const GroundShade& shade, double way_m);
+  [[nodiscard]] bool roofed(const GroundShade& shade, double place_m);
   [[nodiscard]] static UprightObject between_sides(const SettledEdge& left, const SettledEdge& right);
   [[nodiscard]] bool belongs_to_mast(const SettledEdge& edge) const;
   void move_to_mouth(UprightObject& portal, const SettledEdge& left, const SettledEdge& right) const;
@@ -101,6 +104,7 @@ class UprightObjects {
   std::vector<UprightObject> objects_;  // told now
   std::vector<UprightObject> masts_;    // told, not yet forgotten
   double last_bridge_m_ = -1e9;
+  double open_above_m_ = -1e9;  // the last place between walls that had no roof
   Tunnel tunnel_;
   Light light_;
   std::array<Exit, 2> exits_;  // seen so far, right and left
