@@ -70,9 +70,14 @@ void UprightObjects::forget() {
   edges_.clear();
   held_.clear();
   masts_.clear();
-  tunnel_ = {};
   exits_ = {};
   last_bridge_m_ = open_above_m_ = -1e9;
+  tunnel_.left_unseen = in_tunnel(light_.way_m);
+  if (tunnel_.left_unseen) {
+    tunnel_.wall_sigma_m = {kSameWallM, kSameWallM};  // it may be another one
+    return;
+  }
+  tunnel_ = {};
   light_ = {};
 }
 
@@ -81,6 +86,10 @@ void UprightObjects::look_at_light(double beside_grey, double way_m) {
   const double step_m = std::abs(way_m - light_.way_m);
   light_.way_m = way_m;
   light_.near_grey += (beside_grey - light_.near_grey) * (1 - std::exp(-step_m / kNearGreyM));
+  if (tunnel_.left_unseen) {
+    if (beside_grey > kOutShare * light_.usual_grey) tunnel_ = {};
+    tunnel_.left_unseen = false;
+  }
   if (!in_tunnel(way_m)) {
     light_.usual_grey += (beside_grey - light_.usual_grey) * (1 - std::exp(-step_m / kUsualGreyM));
   } else if (way_m - light_.tunnel_like_m > kOutM) {  // no tunnel, or its portal out was missed

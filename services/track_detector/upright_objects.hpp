@@ -36,6 +36,7 @@ class UprightObjects {
   /// Gives what is certain now; valid until the next call.
   const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker,
                                         const GroundShade& shade, double way_m, double beside_grey);
+  /// How far the train has run is not known any more; that it is in a tunnel is kept until there is daylight.
   void forget();
   /// Behind a portal in that daylight led to, and since then neither a portal out nor daylight for long.
   [[nodiscard]] bool in_tunnel(double way_m) const;
@@ -87,6 +88,7 @@ class UprightObjects {
     double daylight_grey = 0;            // beside it
     std::array<double, 2> wall_m{0, 0};  // right and left, where the last edges on them stood
     std::array<double, 2> wall_sigma_m{0, 0};
+    bool left_unseen = false;  // perhaps: nothing was seen for a while, and not yet again that it is dark
   };
   struct Light {
     bool known = false;

@@ -202,6 +202,40 @@ TEST(Uprights, ATunnelMayBeLong) {
   EXPECT_NEAR(told[1].place_m, kEndM, 0.08);
 }
 
+// Seen at way 0 to 50 and from 56 on, at the brightness that is beside the track then.
+std::vector<UprightObject> pass_blind(double grey_behind_gap) {
+  const auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15}, {90, 2.7, 210, 170, 210, 200}});
+  EdgeTracker tracker;
+  GroundShade shade;
+  UprightObjects objects;
+  std::vector<UprightObject> told;
+  std::vector<UprightEdge> edges;
+  for (double way_m = 0; way_m < 100; way_m += kStepM) {
+    if (way_m > 50 && way_m < 56) {
+      tracker.forget();
+      objects.forget();
+      continue;
+    }
+    const double beside_grey = way_m < 40 || way_m > 75 ? kDay : way_m < 50 ? kLining : grey_behind_gap;
+    const auto profile = see(corners, way_m, edges);
+    const auto& settled = tracker.follow(edges, profile, {}, way_m);
+    show_ground(shade, way_m);
+    for (const auto& object : objects.add(settled, tracker, shade, way_m, beside_grey)) told.push_back(object);
+  }
+  return told;
+}
+
+TEST(Uprights, AGapInATunnelDoesNotLoseItsPortalOut) {
+  const auto told = pass_blind(kLining);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 90, 0.1);
+}
+
+TEST(Uprights, DaylightBehindAGapEndsATunnelWithoutAPortalOut) {
+  EXPECT_EQ(pass_blind(kDay).size(), 1U);
+}
+
 TEST(Uprights, ATrainThatBacksOverOpenLandAtNightIsNotBetweenWalls) {
   EdgeTracker tracker;
   UprightObjects objects;
