@@ -25,6 +25,9 @@ namespace railfix::track_detector {
 /// way_sigma: error of the way, share of it.
 [[nodiscard]] Sighting sighting_of(const UprightObject& object, double way_m, int64_t now_ns, double way_sigma);
 
+/// Error of the way past what stands beside the track, share of it: it is one with the height above the ground.
+[[nodiscard]] double way_past_sigma(const LandmarkOptions& options, double height_m);
+
 class LandmarkFinder {
  public:
   LandmarkFinder(const geometry::Intrinsics& camera, const LandmarkOptions& options);
