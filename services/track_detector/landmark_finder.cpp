@@ -60,6 +60,10 @@ Sighting sighting_of(const UprightObject& object, double way_m, int64_t now_ns, 
   return sighting;
 }
 
+double way_past_sigma(const LandmarkOptions& options, double height_m) {
+  return std::hypot(options.way_sigma, options.texture_depth_sigma_m / (height_m + options.texture_depth_m));
+}
+
 LandmarkFinder::LandmarkFinder(const geometry::Intrinsics& camera, const LandmarkOptions& options)
     : camera_(camera),
       options_(options),
@@ -101,6 +105,7 @@ bool LandmarkFinder::move(const LandmarkPicture& picture) {
     platforms_.forget();
     edges_.forget();
     uprights_.forget();
+    shade_.forget();
     return false;
   }
   speed_mps_ = *step_m / core::seconds(picture.stamp_ns - stamp_ns_);
@@ -108,6 +113,7 @@ bool LandmarkFinder::move(const LandmarkPicture& picture) {
   // The sheet lies at the height of balises, the texture that was followed lower.
   way_m_ +=
       *step_m * (picture.pose.height_m + options_.texture_depth_m) / (picture.pose.height_m + options_.balise_depth_m);
+  shade_.add(view_, maker_->sheet(), way_m_);
   return true;
 }
 
@@ -144,7 +150,8 @@ void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
     if (uprights_.in_tunnel(way_m_) || uprights_.lit_walls()) continue;  // walls, ducts and lamps look like platforms
     const double ahead_m = end.place_m - way_m_;
     report({LandmarkType::platform, picture.stamp_ns, ahead_m, end.lateral_m,
-            std::hypot(end.sigma_m, options_.way_sigma * (std::abs(ahead_m) + kOutOfPictureM)),
+            std::hypot(end.sigma_m,
+                       way_past_sigma(options_, picture.pose.height_m) * (std::abs(ahead_m) + kOutOfPictureM)),
             1.0 - std::exp(-0.5 * end.pictures)},
            picture);
   }
@@ -153,13 +160,15 @@ void LandmarkFinder::find_platforms(const LandmarkPicture& picture) {
 void LandmarkFinder::find_uprights(const LandmarkPicture& picture) {
   const auto& found = upright_search_.find(picture);
   const auto& settled = edges_.follow(found, upright_search_.profile(), picture, way_m_);
-  for (const UprightObject& object : uprights_.add(settled, edges_, way_m_, upright_search_.profile().beside_grey)) {
-    report(sighting_of(object, way_m_, picture.stamp_ns, options_.way_sigma), picture);
+  for (const UprightObject& object :
+       uprights_.add(settled, edges_, shade_, way_m_, upright_search_.profile().beside_grey)) {
+    report(sighting_of(object, way_m_, picture.stamp_ns, way_past_sigma(options_, picture.pose.height_m)), picture);
   }
 }
 
 void LandmarkFinder::report(Sighting sighting, const LandmarkPicture& picture) {
   if (sighting.confidence < options_.lowest_confidence) return;
+  sighting.sigma_m *= picture.sigma_factor;
   sighting.frame_seq = picture.frame_seq;
   sighting.grabbed_ns = picture.grabbed_ns;
   sightings_.push_back(sighting);

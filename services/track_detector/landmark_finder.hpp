@@ -10,6 +10,7 @@
 #include "track_detector/edge_tracker.hpp"
 #include "track_detector/frog_search.hpp"
 #include "track_detector/ground_motion.hpp"
+#include "track_detector/ground_shade.hpp"
 #include "track_detector/ground_tracker.hpp"
 #include "track_detector/landmark_types.hpp"
 #include "track_detector/plate_search.hpp"
@@ -23,6 +24,9 @@ namespace railfix::track_detector {
 /// What stands beside the track, told at way_m as of the picture that showed it nearest, if that is not long ago.
 /// way_sigma: error of the way, share of it.
 [[nodiscard]] Sighting sighting_of(const UprightObject& object, double way_m, int64_t now_ns, double way_sigma);
+
+/// Error of the way past what stands beside the track, share of it: it is one with the height above the ground.
+[[nodiscard]] double way_past_sigma(const LandmarkOptions& options, double height_m);
 
 class LandmarkFinder {
  public:
@@ -44,6 +48,7 @@ class LandmarkFinder {
   std::unique_ptr<vision::TopViewMaker> maker_;
   vision::TopView view_;
   GroundMotion motion_;
+  GroundShade shade_;
   double way_m_ = 0;  // run since the beginning, good to a percent
   int64_t stamp_ns_ = 0;
   double speed_mps_ = 0;

@@ -21,8 +21,9 @@ struct LandmarkOptions {
   int fewest_pictures = 4;
   double lowest_confidence = 0.88;  // below it nothing is reported: a false sighting is worse than a missed one
   double gauge_m = 1.435;
-  double texture_depth_m = 0.19;  // of sleepers and ballast below the rail heads, for the way between pictures
-  double way_sigma = 0.01;        // of that way, share of it
+  double texture_depth_m = 0.19;        // of sleepers and ballast below the rail heads, for the way between pictures
+  double texture_depth_sigma_m = 0.06;  // crossing panels and snow lie higher, for all of a mast's looks alike
+  double way_sigma = 0.01;              // of that way, share of it
   bool frogs = true;
   bool platforms = true;
   bool uprights = true;  // masts, portals, bridges
@@ -33,6 +34,7 @@ struct LandmarkPicture {
   int64_t stamp_ns = 0;
   geometry::CameraPose pose;
   double pitch_sigma_rad = 0.0005;
+  double sigma_factor = 1;  // by the picture's health, of every sighting; the pitch's sigma is without it
   double curvature_per_m = 0;
   double vertical_curvature_per_m = 0;
   uint64_t frame_seq = 0;

@@ -58,6 +58,8 @@ struct TrackDetectorConfig {
     fields.flag("uprights", landmarks.uprights, "Masts, tunnel portals and bridges.");
     fields.number("texture_depth_m", landmarks.texture_depth_m, {0, 0.5}, "m",
                   "Sleepers and ballast below the rail heads: scale of the way between pictures.");
+    fields.number("texture_depth_sigma_m", landmarks.texture_depth_sigma_m, {0, 0.3}, "m",
+                  "Scatter of it from place to place: masts to platforms are as wrong as the way past them.");
     fields.number("way_sigma", landmarks.way_sigma, {0.001, 0.1}, "", "Error of that way, share of it.");
   }
   void describe_imu_roll(service::Fields& fields) {

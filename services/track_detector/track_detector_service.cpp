@@ -192,7 +192,8 @@ void TrackDetectorService::find_landmarks(const cv::Mat& grey, const TrackObserv
   picture.grey = grey;
   picture.stamp_ns = frame.stamp_ns();
   picture.pose = observation.shape.camera;
-  picture.pitch_sigma_rad = std::sqrt(observation.covariance(1, 1));
+  picture.sigma_factor = messaging::sigma_factor(frame.health());
+  picture.pitch_sigma_rad = std::sqrt(observation.covariance(1, 1)) / picture.sigma_factor;
   picture.curvature_per_m = observation.shape.curvature_per_m;
   picture.vertical_curvature_per_m = observation.shape.vertical_curvature_per_m;
   picture.frame_seq = frame.seq();

@@ -17,6 +17,9 @@ constexpr double kBridgeWidthM[] = {6.0, 28.0};
 constexpr double kWallShare = 0.85;  // of the outer brightness
 constexpr double kDeepShare = 0.5;
 constexpr double kMouthM = 8;
+constexpr double kRoofedShare =
+    0.8;  // of the ground's brightness: under simulated roofs 0.29 to 0.72, between mere walls 0.96
+constexpr double kNextPanelM = 4;
 constexpr double kOpeningOffM = 0.5;   // both sides together from the mean of each its own
 constexpr double kWallSigmaM = 0.03;   // of its lateral offset at the portal in
 constexpr double kNearerAloneM = 2.0;  // way on which only one side shows, which tells more than both before
@@ -67,9 +70,14 @@ void UprightObjects::forget() {
   edges_.clear();
   held_.clear();
   masts_.clear();
-  tunnel_ = {};
   exits_ = {};
-  last_bridge_m_ = -1e9;
+  last_bridge_m_ = open_above_m_ = -1e9;
+  tunnel_.left_unseen = in_tunnel(light_.way_m);
+  if (tunnel_.left_unseen) {
+    tunnel_.wall_sigma_m = {kSameWallM, kSameWallM};  // it may be another one
+    return;
+  }
+  tunnel_ = {};
   light_ = {};
 }
 
@@ -78,6 +86,10 @@ void UprightObjects::look_at_light(double beside_grey, double way_m) {
   const double step_m = std::abs(way_m - light_.way_m);
   light_.way_m = way_m;
   light_.near_grey += (beside_grey - light_.near_grey) * (1 - std::exp(-step_m / kNearGreyM));
+  if (tunnel_.left_unseen) {
+    if (beside_grey > kOutShare * light_.usual_grey) tunnel_ = {};
+    tunnel_.left_unseen = false;
+  }
   if (!in_tunnel(way_m)) {
     light_.usual_grey += (beside_grey - light_.usual_grey) * (1 - std::exp(-step_m / kUsualGreyM));
   } else if (way_m - light_.tunnel_like_m > kOutM) {  // no tunnel, or its portal out was missed
@@ -96,7 +108,7 @@ bool UprightObjects::lit_walls() const {
 }
 
 const std::vector<UprightObject>& UprightObjects::add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker,
-                                                      double way_m, double beside_grey) {
+                                                      const GroundShade& shade, double way_m, double beside_grey) {
   objects_.clear();
   look_at_light(beside_grey, way_m);
   for (const SettledEdge& edge : edges) {
@@ -112,7 +124,7 @@ const std::vector<UprightObject>& UprightObjects::add(const std::vector<SettledE
     pair_masts();
   }
   find_stripes(way_m);
-  pair_sides(way_m);
+  pair_sides(shade, way_m);
   release(way_m);
   release_exit(tracker, way_m, beside_grey);
   std::erase_if(edges_, [way_m](const Edge& e) { return e.edge.place_m < way_m - kForgetM; });
@@ -203,7 +215,7 @@ UprightObject UprightObjects::between_sides(const SettledEdge& left, const Settl
   return object;
 }
 
-void UprightObjects::pair_sides(double way_m) {
+void UprightObjects::pair_sides(const GroundShade& shade, double way_m) {
   const auto dark = [](const SettledEdge& edge) {
     return edge.inner_grey < kDarkShare * edge.outer_grey && edge.wall_grey < kWallShare * edge.outer_grey;
   };
@@ -226,10 +238,23 @@ void UprightObjects::pair_sides(double way_m) {
         object.outer_grey = std::min(left.edge.outer_grey, right.edge.outer_grey);
         move_to_mouth(object, left.edge, right.edge);
       }
+      if (!roofed(shade, object.place_m)) continue;
       left.used = right.used = true;
       hold(object);
     }
   }
+}
+
+// Noise barriers, or lorries on both sides of a crossing, end as walls of a bridge do, but leave the ground its light.
+// Where that was taken for so of a mouth, the panels behind it are not told in its stead.
+bool UprightObjects::roofed(const GroundShade& shade, double place_m) {
+  const auto share = shade.share(place_m);
+  if (!share) return false;
+  const double behind_m = place_m - open_above_m_;
+  const bool panel = behind_m > -kSidesM && behind_m < kNextPanelM;
+  if (*share < kRoofedShare && !panel) return true;
+  open_above_m_ = std::max(open_above_m_, place_m);
+  return false;
 }
 
 // A tunnel's panels look like its mouth, which comes first but may have been followed on one side only.

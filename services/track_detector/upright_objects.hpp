@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "track_detector/edge_tracker.hpp"
+#include "track_detector/ground_shade.hpp"
 #include "track_detector/mast_fit.hpp"
 
 namespace railfix::track_detector {
@@ -30,10 +31,12 @@ struct UprightObject {
 class UprightObjects {
  public:
   UprightObjects();
-  /// Edges that were settled in the picture at way_m, who followed them, and how bright it is beside the track there.
+  /// Edges that were settled in the picture at way_m, who followed them, the ground so far, and how bright it is beside
+  /// the track there.
   /// Gives what is certain now; valid until the next call.
-  const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker, double way_m,
-                                        double beside_grey);
+  const std::vector<UprightObject>& add(const std::vector<SettledEdge>& edges, const EdgeTracker& tracker,
+                                        const GroundShade& shade, double way_m, double beside_grey);
+  /// How far the train has run is not known any more; that it is in a tunnel is kept until there is daylight.
   void forget();
   /// Behind a portal in that daylight led to, and since then neither a portal out nor daylight for long.
   [[nodiscard]] bool in_tunnel(double way_m) const;
@@ -59,7 +62,8 @@ class UprightObjects {
   void pair_masts();
   void find_stripes(double way_m);
   void tell_mast(const SettledEdge& inner, const MastPlace& at);
-  void pair_sides(double way_m);
+  void pair_sides(const GroundShade& shade, double way_m);
+  [[nodiscard]] bool roofed(const GroundShade& shade, double place_m);
   [[nodiscard]] static UprightObject between_sides(const SettledEdge& left, const SettledEdge& right);
   [[nodiscard]] bool belongs_to_mast(const SettledEdge& edge) const;
   void move_to_mouth(UprightObject& portal, const SettledEdge& left, const SettledEdge& right) const;
@@ -84,6 +88,7 @@ class UprightObjects {
     double daylight_grey = 0;            // beside it
     std::array<double, 2> wall_m{0, 0};  // right and left, where the last edges on them stood
     std::array<double, 2> wall_sigma_m{0, 0};
+    bool left_unseen = false;  // perhaps: nothing was seen for a while, and not yet again that it is dark
   };
   struct Light {
     bool known = false;
@@ -101,6 +106,7 @@ class UprightObjects {
   std::vector<UprightObject> objects_;  // told now
   std::vector<UprightObject> masts_;    // told, not yet forgotten
   double last_bridge_m_ = -1e9;
+  double open_above_m_ = -1e9;  // the last place between walls that had no roof
   Tunnel tunnel_;
   Light light_;
   std::array<Exit, 2> exits_;  // seen so far, right and left

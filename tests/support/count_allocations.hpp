@@ -29,7 +29,7 @@ class CountingMatAllocator : public cv::MatAllocator {
 class CountMatrices {
  public:
   CountMatrices() { cv::Mat::setDefaultAllocator(&allocator_); }
-  ~CountMatrices() { cv::Mat::setDefaultAllocator(nullptr); }
+  ~CountMatrices() { cv::Mat::setDefaultAllocator(cv::Mat::getStdAllocator()); }
   CountMatrices(const CountMatrices&) = delete;
   CountMatrices& operator=(const CountMatrices&) = delete;
 

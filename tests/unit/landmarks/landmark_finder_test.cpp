@@ -81,7 +81,7 @@ struct Place {
   Sighting sighting;
 };
 
-std::vector<Place> ride(Scene& scene, double speed_mps, double to_m) {
+std::vector<Place> ride(Scene& scene, double speed_mps, double to_m, double sigma_factor = 1) {
   LandmarkFinder finder(camera(), {});
   std::vector<Place> places;
   constexpr double kRate = 30.0;
@@ -90,6 +90,7 @@ std::vector<Place> ride(Scene& scene, double speed_mps, double to_m) {
     picture.grey = scene.picture(10.0 + i * speed_mps / kRate);
     picture.stamp_ns = core::to_ns(i / kRate);
     picture.pose = mount();
+    picture.sigma_factor = sigma_factor;
     for (const Sighting& sighting : finder.process(picture)) {
       places.push_back({10.0 + speed_mps * core::seconds(sighting.stamp_ns) + sighting.distance_ahead_m, sighting});
     }
@@ -104,6 +105,25 @@ TEST(LandmarkFinder, ReportsABaliseOnceAndWhereItLies) {
   EXPECT_NEAR(places[0].distance_m, 30.0, 0.05);
   EXPECT_NEAR(places[0].sighting.lateral_m, 0.0, 0.03);
   EXPECT_LT(std::abs(places[0].distance_m - 30.0), 2.5 * places[0].sighting.sigma_m);
+}
+
+// Over crossing panels or snow all that stands beside the track is off the same way.
+TEST(LandmarkFinder, DoubtsTheWayByTheGroundThatItWasMeasuredOn) {
+  const double panels = (0.19 - 0.02) / (2.5 + 0.19);  // a crossing, 2 cm below the rail heads
+  EXPECT_LT(panels, 3 * way_past_sigma({}, 2.5));
+  LandmarkOptions known;
+  known.texture_depth_sigma_m = 0;
+  EXPECT_EQ(way_past_sigma(known, 2.5), known.way_sigma);
+}
+
+TEST(LandmarkFinder, DoubtsWhatWasSeenBadly) {
+  Scene scene;
+  Scene same;
+  const auto well = ride(scene, 9, 30);
+  const auto badly = ride(same, 9, 30, 2.5);
+  ASSERT_EQ(well.size(), 1U);
+  ASSERT_EQ(badly.size(), 1U);
+  EXPECT_NEAR(badly[0].sighting.sigma_m, 2.5 * well[0].sighting.sigma_m, 1e-9);
 }
 
 TEST(LandmarkFinder, FindsABaliseAtLineSpeed) {

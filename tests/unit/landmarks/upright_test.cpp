@@ -59,6 +59,16 @@ UprightProfile see(const std::vector<Corner>& corners, double way_m, std::vector
 constexpr double kDay = 80;  // grey levels beside the track
 constexpr double kNight = 6;
 constexpr double kLining = 32;
+constexpr double kRoofM = 40.5;  // behind it the ground is in the shade
+constexpr double kNoRoofM = 1e9;
+
+/// The ground from way_m as GroundShade sees it.
+void show_ground(GroundShade& shade, double way_m, double roof_m = kRoofM) {
+  const vision::Sheet sheet{3.5, 0.58, 0.02, 525, 59};
+  vision::TopView view{cv::Mat(sheet.rows, sheet.cols, CV_32F), std::vector<uint8_t>(525, 1)};
+  for (int row = 0; row < sheet.rows; ++row) view.grey.row(row).setTo(way_m + sheet.ahead_m(row) < roof_m ? 80 : 40);
+  shade.add(view, sheet, way_m);
+}
 
 /// These and their like on the other wall.
 std::vector<Corner> on_both_walls(std::vector<Corner> corners) {
@@ -70,8 +80,9 @@ std::vector<Corner> on_both_walls(std::vector<Corner> corners) {
 }
 
 std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m, double beside_grey = kDay,
-                                float score_share = 1, double curvature_per_m = 0) {
+                                float score_share = 1, double curvature_per_m = 0, double roof_m = kRoofM) {
   EdgeTracker tracker;
+  GroundShade shade;
   UprightObjects objects;
   std::vector<UprightObject> told;
   std::vector<UprightEdge> edges;
@@ -81,7 +92,8 @@ std::vector<UprightObject> pass(const std::vector<Corner>& corners, double to_m,
     picture.stamp_ns = core::to_ns(way_m / kSpeedMps);
     const auto profile = see(corners, way_m, edges, score_share, curvature_per_m);
     const auto& settled = tracker.follow(edges, profile, picture, way_m);
-    for (const auto& object : objects.add(settled, tracker, way_m, beside_grey)) {
+    show_ground(shade, way_m, roof_m);
+    for (const auto& object : objects.add(settled, tracker, shade, way_m, beside_grey)) {
       told.push_back(object);
       EXPECT_NEAR(kSpeedMps * core::seconds(object.seen_ns) + object.seen_ahead_m, object.place_m, 0.12);
       EXPECT_LE(object.seen_ns, picture.stamp_ns);
@@ -167,6 +179,7 @@ TEST(Uprights, ATunnelHasOnePortalInAndOneOut) {
 TEST(Uprights, ATunnelMayBeLong) {
   constexpr double kEndM = 5072.5;
   EdgeTracker tracker;
+  GroundShade shade;
   UprightObjects objects;
   std::vector<UprightObject> told;
   std::vector<UprightEdge> edges;
@@ -180,11 +193,47 @@ TEST(Uprights, ATunnelMayBeLong) {
     picture.stamp_ns = core::to_ns(way_m / kSpeedMps);
     const auto profile = see(corners, way_m, edges);
     const auto& settled = tracker.follow(edges, profile, picture, way_m);
-    for (const auto& object : objects.add(settled, tracker, way_m, lining ? kLining : kDay)) told.push_back(object);
+    show_ground(shade, way_m);
+    for (const auto& object : objects.add(settled, tracker, shade, way_m, lining ? kLining : kDay))
+      told.push_back(object);
   }
   ASSERT_EQ(told.size(), 2U);
   EXPECT_EQ(told[1].type, LandmarkType::portal_out);
   EXPECT_NEAR(told[1].place_m, kEndM, 0.08);
+}
+
+// Seen at way 0 to 50 and from 56 on, at the brightness that is beside the track then.
+std::vector<UprightObject> pass_blind(double grey_behind_gap) {
+  const auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15}, {90, 2.7, 210, 170, 210, 200}});
+  EdgeTracker tracker;
+  GroundShade shade;
+  UprightObjects objects;
+  std::vector<UprightObject> told;
+  std::vector<UprightEdge> edges;
+  for (double way_m = 0; way_m < 100; way_m += kStepM) {
+    if (way_m > 50 && way_m < 56) {
+      tracker.forget();
+      objects.forget();
+      continue;
+    }
+    const double beside_grey = way_m < 40 || way_m > 75 ? kDay : way_m < 50 ? kLining : grey_behind_gap;
+    const auto profile = see(corners, way_m, edges);
+    const auto& settled = tracker.follow(edges, profile, {}, way_m);
+    show_ground(shade, way_m);
+    for (const auto& object : objects.add(settled, tracker, shade, way_m, beside_grey)) told.push_back(object);
+  }
+  return told;
+}
+
+TEST(Uprights, AGapInATunnelDoesNotLoseItsPortalOut) {
+  const auto told = pass_blind(kLining);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[1].type, LandmarkType::portal_out);
+  EXPECT_NEAR(told[1].place_m, 90, 0.1);
+}
+
+TEST(Uprights, DaylightBehindAGapEndsATunnelWithoutAPortalOut) {
+  EXPECT_EQ(pass_blind(kDay).size(), 1U);
 }
 
 TEST(Uprights, ATrainThatBacksOverOpenLandAtNightIsNotBetweenWalls) {
@@ -192,7 +241,7 @@ TEST(Uprights, ATrainThatBacksOverOpenLandAtNightIsNotBetweenWalls) {
   UprightObjects objects;
   int between_walls = 0;
   for (double way_m = 0; way_m > -1500; way_m -= kStepM) {
-    objects.add({}, tracker, way_m, way_m > -1 ? 18 : 14);
+    objects.add({}, tracker, {}, way_m, way_m > -1 ? 18 : 14);
     between_walls += objects.lit_walls() ? 1 : 0;
   }
   EXPECT_EQ(between_walls, 0);
@@ -338,6 +387,7 @@ TEST(Uprights, AnEndThatIsToldInTwoWaysSaysSo) {
 // was before the tunnel, and the mouth shows elsewhere.
 TEST(Uprights, APanelInALampsLightIsNotThePortalOut) {
   EdgeTracker tracker;
+  GroundShade shade;
   UprightObjects objects;
   std::vector<UprightObject> told;
   std::vector<UprightEdge> edges;
@@ -346,7 +396,9 @@ TEST(Uprights, APanelInALampsLightIsNotThePortalOut) {
   for (double way_m = 0; way_m < 80; way_m += kStepM) {
     const auto profile = see(corners, way_m, edges);
     const auto& settled = tracker.follow(edges, profile, {}, way_m);
-    for (const auto& object : objects.add(settled, tracker, way_m, way_m < 40 ? kDay : kLining)) told.push_back(object);
+    show_ground(shade, way_m);
+    for (const auto& object : objects.add(settled, tracker, shade, way_m, way_m < 40 ? kDay : kLining))
+      told.push_back(object);
   }
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].type, LandmarkType::portal_in);
@@ -410,6 +462,22 @@ TEST(Uprights, WallsWithDaylightBehindAreABridge) {
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].type, LandmarkType::bridge);
   EXPECT_NEAR(told[0].place_m, 40, 0.05);
+}
+
+// Noise barriers, or lorries at a crossing: as bright against what is behind them as a portal's face.
+TEST(Uprights, WallsThatEndOppositeEachOtherWithoutARoofAreNothing) {
+  for (const double deep_grey : {100.0, 15.0}) {
+    const auto corners = on_both_walls({{40, 4.2, 60, 150, 65, deep_grey}});
+    EXPECT_TRUE(pass(corners, 60, kDay, 1, 0, kNoRoofM).empty());
+    EXPECT_TRUE(pass(corners, 60, kDay, 1, 0, 48).empty()) << "a bridge 8 m behind them";
+    EXPECT_EQ(pass(corners, 60).size(), 1U);
+  }
+}
+
+// Dry ground in the mouth is as bright as wet ground before it: the panel behind is not where the tunnel begins.
+TEST(Uprights, APanelIsNotToldInsteadOfAMouthThatShowsNoRoof) {
+  const auto corners = on_both_walls({{40, 2.7, 70, 120, 60, 15}, {42.5, 2.7, 40, 70, 40, 15}});
+  EXPECT_TRUE(pass(corners, 60, kDay, 1, 0, 47).empty());
 }
 
 TEST(Uprights, MastsOnBothSidesAreNoBridge) {
