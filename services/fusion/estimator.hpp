@@ -97,7 +97,8 @@ class Estimator {
   [[nodiscard]] Interval widened(const Interval& interval) const;
   [[nodiscard]] double centre_m() const { return place_.path ? filter_.path_distance_m() : distance_m(); }
   [[nodiscard]] double sigma_m() const {
-    return place_.path ? filter_.path_sigma_m() : filter_.sigma(StateIndex::distance);
+    return place_.path ? std::hypot(filter_.path_sigma_m(), parameters_->place_shared_sigma_m)
+                       : filter_.sigma(StateIndex::distance);
   }
   [[nodiscard]] double distance_m() const { return filter_.value(StateIndex::distance); }
   static constexpr double kBridgeS = 10.0;  // as long as the IMU alone is good for place and speed

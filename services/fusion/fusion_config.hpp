@@ -95,6 +95,8 @@ struct FusionConfig {
     f.number("shape_error_length_m", p.shape_error_length_m, {1, 1e6}, "m", "... over such a way.");
     f.number("fix_min_probability", p.fix_min_probability, {0, 1}, "", "Fixes that are less probable are left out.");
     f.number("fix_sigma_floor_m", p.fix_sigma_floor_m, {0.001, 10}, "m", "Least sigma of a fix.");
+    f.number("place_shared_sigma_m", p.place_shared_sigma_m, {0, 10}, "m",
+             "All fixes err alike by so much (mount, map): no number of them makes the place surer.");
   }
   void describe_limits(service::Fields& f) {
     auto& p = parameters;

@@ -61,6 +61,7 @@ struct FusionParameters {
   // Fixes.
   double fix_min_probability = 0.9;
   double fix_sigma_floor_m = 0.05;
+  double place_shared_sigma_m = 0.12;  // all of them are wrong alike by it: the mount's pitch, the map's datum
 
   // Tests on innovations, in standard deviations.
   double gate_camera = 5.0;

@@ -84,7 +84,6 @@ void Hypotheses::apply_fix(const Event& event) {
   const Sides most = most_excess();
   main_.apply(event, {.excess_m = std::max(most.behind_m, most.ahead_m)});
   const bool judged = main_.fix_used() || main_.fix_refused();
-  const bool unexpected = main_.fix_unexpected();
   if (judged && fix.kind == FixKind::landmark && !main_.fix_again())
     residuals_.add(fix.landmark, main_.fix_residual_m(), main_.fix_sigmas_off(0), before.since_fix_m());
   std::vector<Doubter> doubters_before = doubters_;
@@ -108,7 +107,7 @@ void Hypotheses::apply_fix(const Event& event) {
   } else {
     return;
   }
-  confirm_rivals(unexpected);
+  confirm_rivals();
 }
 
 // The fix contradicts an earlier one and agrees with what is known without that one. Without that one less is known, so

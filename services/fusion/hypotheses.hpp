@@ -102,8 +102,8 @@ class Hypotheses {
   void settle_doubters(const FixInput& fix, const std::vector<Doubter>& before);
   bool settle(Doubter& doubter, const Estimator& before, const FixInput& fix) const;
   [[nodiscard]] bool differs_in_scale(const Doubter& doubter) const;
-  /// The main one is confirmed; `unexpected`: by a fix that was no small way from where it had been expected.
-  void confirm_rivals(bool unexpected);
+  /// The main one is confirmed.
+  void confirm_rivals();
   void exclude_faulty();
   [[nodiscard]] Estimator without_faulty(const Rival& rival) const;
   /// It becomes the main one as `next`.

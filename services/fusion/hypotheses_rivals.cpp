@@ -67,12 +67,12 @@ void Hypotheses::take_along(Doubter& doubter, const Estimator& next) const {
   doubter.estimator.refer_back(own.since_reference_m());
 }
 
-void Hypotheses::confirm_rivals(bool unexpected) {
+void Hypotheses::confirm_rivals() {
   for (auto& rival : rivals_) {
     rival.forget_excess();
     // Confirmed is the main one: a rival that is elsewhere was wrong.
     if (!rival.estimator || !rival.estimator->fix_refused()) continue;
-    if (unexpected && stands_for_another(rival)) {
+    if (stands_for_another(rival)) {
       rival.estimator->place_like(main_);
     } else {
       begin_again(rival);
