@@ -53,6 +53,30 @@ TEST_F(RunFolder, ARunThatWasBrokenOffIsAPartOfTheRide) {
   EXPECT_FALSE(is_part(evaluate(made.make(), core::value_or_throw(read_run(root_ / "out")))));
 }
 
+TEST_F(RunFolder, WhatIsMissingOfTheRunOrOfTheTruthIsTold) {
+  std::string states = "stamp_ns,track_known,distance_m,speed_mps,over_m,under_m,integrity,easting_m,northing_m\n";
+  for (int s = 0; s <= 40; ++s) {
+    if (s > 5 && s < 21) continue;
+    const bool known = s < 30;
+    states += std::to_string(s * kSecond) + (known ? ",1," : ",0,") + std::to_string(20 * s) + ",20,1,1,ok," +
+              (known ? "5000," + std::to_string(7000 + 20 * s) : ",") + "\n";
+  }
+  write("out/train_state.csv", states);
+  MadeTruth made;
+  made.seconds = 25;
+  const auto evaluation = evaluate(made.make(), core::value_or_throw(read_run(root_ / "out")));
+  std::ostringstream text;
+  print(evaluation, text);
+  EXPECT_THAT(text.str(), HasSubstr("of 25.0 s for a run of 40.0 s: errors are of these, "));
+  EXPECT_THAT(text.str(), HasSubstr("11 of 26, 0 have no place on the map, 15 no truth\n"));
+  EXPECT_THAT(text.str(), HasSubstr("train_state.csv: NO ROWS for 16.0 s from 5.0 s on\n"));
+  made.seconds = 40;
+  const auto whole = evaluate(made.make(), core::value_or_throw(read_run(root_ / "out")));
+  EXPECT_FALSE(is_longer_than_truth(whole));
+  EXPECT_EQ(to_json(whole)["position"]["states"], 26);
+  EXPECT_EQ(to_json(whole)["position"]["judged"], 15);
+}
+
 TEST_F(RunFolder, FiguresOfTheTablesThatAreThere) {
   write_run();
   const auto run = read_run(root_ / "out");
@@ -98,6 +122,22 @@ TEST_F(RunFolder, ReportNeedsNothingElse) {
   }
   for (const char* outside : {"http://", "https://", "<script", "<link", "nan"})
     EXPECT_THAT(html, Not(HasSubstr(outside))) << outside;
+}
+
+TEST(Services, ThatAreStartedAnewCountOnAndSilenceIsNoLatency) {
+  StatusRow row{"odometry", "cab", "active", 60, 59, 5, 4, 8, 10, 50};
+  std::vector<StatusRow> rows{row};
+  row.frames_in = row.frames_out = row.dropped = row.latency_p50_ms = row.latency_p99_ms = 0;
+  rows.push_back(row);
+  row.frames_in = 30;
+  row.dropped = 2;
+  rows.push_back(row);
+  const auto result = judge_services(rows).front();
+  EXPECT_EQ(result.frames_in, 90);
+  EXPECT_EQ(result.dropped, 7);
+  EXPECT_EQ(result.restarts, 1U);
+  EXPECT_EQ(result.latency_p50_ms, 4);
+  EXPECT_TRUE(std::isnan(judge_services({row}).front().latency_p50_ms));
 }
 
 TEST_F(RunFolder, EmptyTablesGiveNoFiguresAndNoCrash) {

@@ -31,6 +31,17 @@ TEST(TruthTable, WhatLiesInAGapIsNotJudged) {
   EXPECT_EQ(made.make().gaps().count, 0U);
 }
 
+// Between rows a second apart the way bends by an eighth of the acceleration.
+TEST(TruthTable, SaysWhatRowsFarApartLeaveOpen) {
+  std::vector<dataset::TruthRow> rows;
+  for (int s = 0; s <= 10; ++s) {
+    rows.push_back(MadeTruth().row(s));
+    rows.back().distance_m = 0.5 * 0.8 * s * s;
+  }
+  EXPECT_NEAR(Truth(rows, {}, {}).between_rows_m(), 0.1, 1e-9);
+  EXPECT_NEAR(MadeTruth().make().between_rows_m(), 0, 1e-9);
+}
+
 TEST(TruthTable, OneThatIsWrittenEverySecondHasNoGaps) {
   const MadeTruth made;
   std::vector<dataset::TruthRow> rows;

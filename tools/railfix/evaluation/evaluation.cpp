@@ -9,6 +9,29 @@
 
 namespace railfix::evaluation {
 
+namespace {
+
+/// A service that is started anew counts from 0 again.
+double counted(const std::vector<const StatusRow*>& rows, double StatusRow::*field) {
+  double before = 0;
+  double last = kUnknown;
+  for (const StatusRow* row : rows) {
+    const double now = row->*field;
+    if (!std::isfinite(now)) continue;
+    if (now < last) before += last;
+    last = now;
+  }
+  return before + last;
+}
+
+size_t restarts_in(const std::vector<const StatusRow*>& rows) {
+  size_t restarts = 0;
+  for (size_t i = 1; i < rows.size(); ++i) restarts += rows[i]->frames_in < rows[i - 1]->frames_in ? 1 : 0;
+  return restarts;
+}
+
+}  // namespace
+
 std::vector<ServiceResult> judge_services(const std::vector<StatusRow>& rows) {
   std::map<std::pair<std::string, std::string>, std::vector<const StatusRow*>> by_service;
   for (const StatusRow& row : rows) by_service[{row.service, row.host}].push_back(&row);
@@ -19,14 +42,22 @@ std::vector<ServiceResult> judge_services(const std::vector<StatusRow>& rows) {
       for (const StatusRow* row : its) values.push_back(row->*field);
       return summarise(std::move(values));
     };
+    // Where nothing went out there was no latency, which a service says as 0.
+    const auto latency_of = [&its = its](double StatusRow::*field) {
+      std::vector<double> values;
+      for (const StatusRow* row : its)
+        if (row->latency_p99_ms > 0) values.push_back(row->*field);
+      return summarise(std::move(values));
+    };
     ServiceResult result;
     result.service = name.first;
     result.host = name.second;
-    result.frames_in = of(&StatusRow::frames_in).max;
-    result.frames_out = of(&StatusRow::frames_out).max;
-    result.dropped = of(&StatusRow::dropped).max;
-    result.latency_p50_ms = of(&StatusRow::latency_p50_ms).p50;
-    result.latency_p99_ms = of(&StatusRow::latency_p99_ms).max;
+    result.frames_in = counted(its, &StatusRow::frames_in);
+    result.frames_out = counted(its, &StatusRow::frames_out);
+    result.dropped = counted(its, &StatusRow::dropped);
+    result.restarts = restarts_in(its);
+    result.latency_p50_ms = latency_of(&StatusRow::latency_p50_ms).p50;
+    result.latency_p99_ms = latency_of(&StatusRow::latency_p99_ms).max;
     result.cpu_percent = of(&StatusRow::cpu_percent).mean;
     result.rss_mb = of(&StatusRow::rss_mb).max;
     result.last_state = its.back()->state;
@@ -75,15 +106,22 @@ core::Status check_times(const Truth& truth, const RunTables& run) {
 
 namespace {
 
-/// What the tables cover that have a row for every step, the whole truth but for what a start and an end take.
-Stretch covered(const Truth& truth, const RunTables& run) {
-  const Stretch whole = truth.whole();
-  Stretch stretch{INT64_MAX, INT64_MIN};
+/// What the tables cover that have a row for every step.
+std::optional<Stretch> steps_of(const RunTables& run) {
+  std::optional<Stretch> stretch;
   for (const auto& [name, span] : run.spans) {
     if (!span.every_step) continue;
-    stretch = {std::min(stretch.from_ns, span.from_ns), std::max(stretch.to_ns, span.to_ns)};
+    if (!stretch) stretch = {span.from_ns, span.to_ns};
+    stretch = {std::min(stretch->from_ns, span.from_ns), std::max(stretch->to_ns, span.to_ns)};
   }
-  if (stretch.from_ns > stretch.to_ns) return whole;
+  return stretch;
+}
+
+/// What was run of the truth, all of it but for what a start and an end take.
+Stretch covered(const Truth& truth, const std::optional<Stretch>& ran) {
+  const Stretch whole = truth.whole();
+  if (!ran) return whole;
+  Stretch stretch = *ran;
   if (stretch.from_ns < whole.from_ns + core::kNsPerSecond) stretch.from_ns = whole.from_ns;
   if (stretch.to_ns > whole.to_ns - core::kNsPerSecond) stretch.to_ns = whole.to_ns;
   return stretch;
@@ -93,15 +131,20 @@ Stretch covered(const Truth& truth, const RunTables& run) {
 
 Evaluation evaluate(const Truth& truth, const RunTables& run) {
   Evaluation result;
-  const Stretch stretch = covered(truth, run);
+  const auto ran = steps_of(run);
+  const Stretch stretch = covered(truth, ran);
   result.duration_s = core::seconds(stretch.to_ns - stretch.from_ns);
   result.travelled_m = truth.travelled_m(stretch);
   result.ride_s = core::seconds(truth.whole().to_ns - truth.whole().from_ns);
   result.ride_m = truth.travelled_m(truth.whole());
+  if (ran) result.run_s = core::seconds(ran->to_ns - ran->from_ns);
   result.truth_gaps = truth.gaps();
+  result.truth_between_rows_m = truth.between_rows_m();
   result.missing = run.missing;
   result.empty = run.empty;
   result.out_of_order = run.out_of_order;
+  for (const auto& [name, span] : run.spans)
+    if (span.every_step && span.gaps.count > 0) result.gaps[name] = span.gaps;
   if (run.odometry) result.odometry = judge_odometry(truth, *run.odometry);
   if (run.states) result.position = judge_position(truth, *run.states);
   if (run.views) result.views = judge_views(truth, *run.views);

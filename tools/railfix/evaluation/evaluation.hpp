@@ -18,7 +18,8 @@ struct ServiceResult {
   double frames_in = 0;
   double frames_out = 0;
   double dropped = 0;
-  double latency_p50_ms = kUnknown;  // median of what the service said each second
+  size_t restarts = 0;               // its counters began again
+  double latency_p50_ms = kUnknown;  // median of what the service said each second in which something went out
   double latency_p99_ms = kUnknown;  // the worst second
   double cpu_percent = kUnknown;     // mean
   double rss_mb = kUnknown;          // largest
@@ -39,7 +40,9 @@ struct Evaluation {
   double travelled_m = 0;
   double ride_s = 0;  // ... and of the truth: a run that was broken off is shorter
   double ride_m = 0;
-  Truth::Gaps truth_gaps;
+  double run_s = 0;  // of the tables that have a row for every step; a truth may be shorter
+  TimeGaps truth_gaps;
+  double truth_between_rows_m = 0;
   std::optional<OdometryResult> odometry;
   std::optional<PositionResult> position;
   std::optional<ViewResult> views;
@@ -51,6 +54,7 @@ struct Evaluation {
   std::vector<std::string> missing;
   std::vector<std::string> empty;              // tables with a header alone, not judged
   std::map<std::string, size_t> out_of_order;  // rows that stood below a newer one, by table
+  std::map<std::string, TimeGaps> gaps;        // of tables that have a row for every step
 };
 /// An error names both times where the truth has none in common with the run, or with a table of every step.
 core::Status check_times(const Truth& truth, const RunTables& run);
@@ -59,6 +63,10 @@ Evaluation evaluate(const Truth& truth, const RunTables& run);
 /// Of a ride that goes on without the run, or began before it.
 inline bool is_part(const Evaluation& evaluation) {
   return evaluation.duration_s < evaluation.ride_s;
+}
+/// The run began before its truth or goes on behind it.
+inline bool is_longer_than_truth(const Evaluation& evaluation) {
+  return evaluation.run_s > evaluation.ride_s + 1;
 }
 
 void print(const Evaluation& evaluation, std::ostream& out);

@@ -72,6 +72,9 @@ void headline_figures(Html& html, const Evaluation& e) {
     html.figure("position error, p95", number(e.position->error_m.p95, "%.3f m"));
     html.figure("position error, max", number(e.position->error_m.max, "%.3f m"));
     html.figure("interval coverage", number(e.position->coverage_percent, "%.2f %%"));
+    if (e.position->samples.size() < e.position->states)
+      html.figure("states judged",
+                  std::to_string(e.position->samples.size()) + " of " + std::to_string(e.position->states));
     html.figure("track known", number(e.position->known_percent, "%.1f %%"));
     html.figure("on the right track", number(e.position->right_percent, "%.1f %%"));
   }

@@ -198,6 +198,9 @@ OdometryResult judge_odometry(const Truth& truth, const std::vector<OdometryRow>
 
 PositionResult judge_position(const Truth& truth, const std::vector<StateRow>& rows) {
   PositionResult result;
+  result.states = rows.size();
+  result.beside_truth = static_cast<size_t>(
+      std::ranges::count_if(rows, [&](const StateRow& row) { return truth.at(row.stamp_ns).has_value(); }));
   result.motion = beside_truth(truth, rows);
   result.drift = drift_of(result.motion);
   result.speed_rms_mps = speed_rms(result.motion);

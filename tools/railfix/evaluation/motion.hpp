@@ -59,6 +59,8 @@ struct PositionResult {
   bool from_map = false;
   bool truth_lacks_heading = false;
   std::vector<PositionSample> samples;  // only those with a position
+  size_t states = 0;
+  size_t beside_truth = 0;  // of them, those whose time the truth holds
   std::vector<MotionSample> motion;
   Drift drift;      // of the state's distance_m
   Summary error_m;  // |along|

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "core/time.hpp"
 #include "evaluation/evaluation.hpp"
 
 namespace railfix::evaluation {
@@ -65,10 +66,17 @@ void print_position(std::ostream& out, const PositionResult& position) {
           : position.truth_lacks_heading ? "distance since the first state only: the truth has no heading"
                                          : "distance since the first state only: no map coordinates to compare")
       << ")\n";
+  if (position.samples.size() < position.states) {
+    const size_t placeless = position.beside_truth - position.samples.size();
+    line(out, "states judged",
+         std::to_string(position.samples.size()) + " of " + std::to_string(position.states) + ", " +
+             std::to_string(placeless) + " have no place on the map, " +
+             std::to_string(position.states - position.beside_truth) + " no truth");
+  }
   line(out, "error along the track", spread(position.error_m, metres) + ", bias " + metres(position.bias_m));
   if (position.cross_m.count > 0) line(out, "error across", spread(position.cross_m, metres));
   line(out, "interval coverage",
-       share(position.coverage_percent) + " of all, " + share(position.coverage_usable_percent) +
+       share(position.coverage_percent) + " of those judged, " + share(position.coverage_usable_percent) +
            " where not unusable (" + share(position.usable_percent) + ")");
   if (position.without_interval > 0)
     line(out, "without interval", std::to_string(position.without_interval) + " states");
@@ -121,8 +129,9 @@ void print_services(std::ostream& out, const std::vector<ServiceResult>& service
     const auto count = [](double value) { return figure(value, "%.0f", ""); };
     line(out, s.service,
          "in " + count(s.frames_in) + ", out " + count(s.frames_out) + ", dropped " + count(s.dropped) +
-             ", latency p50 " + ms(s.latency_p50_ms) + " p99 " + ms(s.latency_p99_ms) + ", cpu " +
-             figure(s.cpu_percent, "%.1f", " %") + ", " + figure(s.rss_mb, "%.0f", " MB") + ", " + s.last_state);
+             (s.restarts > 0 ? ", started anew " + std::to_string(s.restarts) + " times" : "") + ", latency p50 " +
+             ms(s.latency_p50_ms) + " p99 " + ms(s.latency_p99_ms) + ", cpu " + figure(s.cpu_percent, "%.1f", " %") +
+             ", " + figure(s.rss_mb, "%.0f", " MB") + ", " + s.last_state);
   }
 }
 
@@ -156,6 +165,9 @@ ordered_json odometry_json(const OdometryResult& odometry) {
 
 ordered_json position_json(const PositionResult& position) {
   return {{"basis", position.from_map ? "map" : "distance"},
+          {"states", position.states},
+          {"judged", position.samples.size()},
+          {"without_truth", position.states - position.beside_truth},
           {"position_error_m", to_json(position.error_m)},
           {"bias_m", position.bias_m},
           {"cross_error_m", to_json(position.cross_m)},
@@ -223,6 +235,7 @@ ordered_json services_json(const std::vector<ServiceResult>& services) {
                     {"frames_in", s.frames_in},
                     {"frames_out", s.frames_out},
                     {"dropped", s.dropped},
+                    {"restarts", s.restarts},
                     {"latency_p50_ms", s.latency_p50_ms},
                     {"latency_p99_ms", s.latency_p99_ms},
                     {"cpu_percent", s.cpu_percent},
@@ -239,15 +252,40 @@ ordered_json or_null(const std::optional<T>& part, Write write) {
 
 }  // namespace
 
+namespace {
+
+/// What the truth cannot tell.
+void print_truth(std::ostream& out, const Evaluation& evaluation) {
+  constexpr double kWorthSayingM = 0.01;
+  const auto seconds = [](double value) { return figure(value, "%.1f", " s"); };
+  if (is_longer_than_truth(evaluation))
+    line(out, "truth",
+         "of " + seconds(evaluation.ride_s) + " for a run of " + seconds(evaluation.run_s) +
+             ": errors are of these, shares of steps, fixes, reports and services of all");
+  if (const auto& gaps = evaluation.truth_gaps; gaps.count > 0)
+    line(out, "gaps in the truth",
+         std::to_string(gaps.count) + " of up to " + seconds(gaps.longest_s) + ", not judged there");
+  if (evaluation.truth_between_rows_m > kWorthSayingM)
+    line(out, "between its rows",
+         "the truth itself is off by up to " + metres(evaluation.truth_between_rows_m) +
+             ": they are far apart for its accelerations");
+}
+
+void print_gaps(std::ostream& out, const std::map<std::string, TimeGaps>& gaps_of) {
+  for (const auto& [name, gaps] : gaps_of)
+    out << name << ": NO ROWS for " << figure(gaps.longest_s, "%.1f", " s") << " from "
+        << figure(core::seconds(gaps.longest_from_ns), "%.1f", " s") << " on"
+        << (gaps.count > 1 ? ", and in " + std::to_string(gaps.count - 1) + " more gaps" : "") << '\n';
+}
+
+}  // namespace
+
 void print(const Evaluation& evaluation, std::ostream& out) {
   out << "run of " << metres(evaluation.travelled_m) << " in " << figure(evaluation.duration_s, "%.1f", " s");
   if (is_part(evaluation))
     out << ", a part of the ride of " << metres(evaluation.ride_m) << " in " << figure(evaluation.ride_s, "%.1f", " s");
   out << '\n';
-  if (const auto& gaps = evaluation.truth_gaps; gaps.count > 0) {
-    line(out, "gaps in the truth",
-         std::to_string(gaps.count) + " of up to " + figure(gaps.longest_s, "%.1f", " s") + ", not judged there");
-  }
+  print_truth(out, evaluation);
   if (evaluation.odometry) print_odometry(out, *evaluation.odometry);
   if (evaluation.position) print_position(out, *evaluation.position);
   if (evaluation.views) print_views(out, *evaluation.views);
@@ -272,6 +310,7 @@ void print(const Evaluation& evaluation, std::ostream& out) {
   for (const std::string& name : evaluation.empty) out << name << ": has a header and no row, not judged\n";
   for (const auto& [name, rows] : evaluation.out_of_order)
     out << name << ": OUT OF ORDER, " << rows << " rows are older than one above them\n";
+  print_gaps(out, evaluation.gaps);
 }
 
 ordered_json to_json(const Evaluation& evaluation) {
@@ -281,6 +320,12 @@ ordered_json to_json(const Evaluation& evaluation) {
                        {"ride_m", evaluation.ride_m},
                        {"missing", evaluation.missing}};
   json["truth_gaps"] = {{"count", evaluation.truth_gaps.count}, {"longest_s", evaluation.truth_gaps.longest_s}};
+  json["truth_between_rows_m"] = evaluation.truth_between_rows_m;
+  json["run_s"] = evaluation.run_s;
+  json["gaps"] = ordered_json::object();
+  for (const auto& [name, gaps] : evaluation.gaps)
+    json["gaps"][name] = {
+        {"count", gaps.count}, {"longest_s", gaps.longest_s}, {"from_s", core::seconds(gaps.longest_from_ns)}};
   json["empty"] = evaluation.empty;
   json["out_of_order"] = evaluation.out_of_order;
   json["odometry"] = or_null(evaluation.odometry, odometry_json);

@@ -11,6 +11,7 @@
 
 #include "core/result.hpp"
 #include "evaluation/statistics.hpp"
+#include "evaluation/time_gaps.hpp"
 
 namespace railfix::evaluation {
 
@@ -103,6 +104,7 @@ struct RunTables {
     int64_t from_ns = 0;
     int64_t to_ns = 0;
     bool every_step = false;  // of a table that has a row for every step of its service
+    TimeGaps gaps{};          // of such a table
   };
   /// Of the stamps, by the name of the table that has any.
   std::map<std::string, Span> spans{};

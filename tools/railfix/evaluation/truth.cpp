@@ -16,13 +16,6 @@ using dataset::TruthRow;
 
 namespace {
 
-int64_t longest_step_ns(const std::vector<TruthRow>& rows) {
-  std::vector<double> steps;
-  for (size_t i = 1; i < rows.size(); ++i)
-    steps.push_back(static_cast<double>(rows[i].stamp_ns - rows[i - 1].stamp_ns));
-  return std::max(core::kNsPerSecond, static_cast<int64_t>(3 * summarise(steps).p50));
-}
-
 /// Degrees, or an angle that counts from the east, would put every error along the track across it. A train runs either
 /// way along its track.
 core::Status check_headings(const std::vector<TruthRow>& rows, const std::filesystem::path& file) {
@@ -88,7 +81,7 @@ void Truth::set_visibility(const std::vector<dataset::TruthVisibility>& rows) {
 Truth::Truth(std::vector<TruthRow> rows, std::optional<std::vector<dataset::TruthLandmark>> landmarks,
              std::optional<dataset::CameraCalibration> calibration)
     : rows_(std::move(rows)), landmarks_(std::move(landmarks)), calibration_(std::move(calibration)) {
-  longest_step_ns_ = longest_step_ns(rows_);
+  longest_step_ns_ = longest_step_ns(stamps_of(rows_));
   for (const TruthRow& row : rows_) {
     if (!std::isfinite(row.curvature_per_m)) continue;
     const double vertical = std::isfinite(row.vertical_curvature_per_m) ? row.vertical_curvature_per_m : 0.0;
@@ -126,14 +119,18 @@ std::optional<TruthRow> Truth::at(int64_t stamp_ns) const {
   return row;
 }
 
-Truth::Gaps Truth::gaps() const {
-  Gaps gaps;
-  for (size_t i = 1; i < rows_.size(); ++i) {
-    if (!is_gap(rows_[i - 1].stamp_ns, rows_[i].stamp_ns)) continue;
-    ++gaps.count;
-    gaps.longest_s = std::max(gaps.longest_s, core::seconds(rows_[i].stamp_ns - rows_[i - 1].stamp_ns));
+double Truth::between_rows_m() const {
+  double most_m = 0;
+  for (size_t i = 1; i + 1 < rows_.size(); ++i) {
+    const TruthRow& a = rows_[i - 1];
+    const TruthRow& b = rows_[i + 1];
+    if (is_gap(a.stamp_ns, rows_[i].stamp_ns) || is_gap(rows_[i].stamp_ns, b.stamp_ns)) continue;
+    const double share =
+        static_cast<double>(rows_[i].stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
+    const double middle_m = a.distance_m + share * (b.distance_m - a.distance_m);
+    most_m = std::max(most_m, std::abs(rows_[i].distance_m - middle_m) / 4);
   }
-  return gaps;
+  return most_m;
 }
 
 Truth::Bend Truth::bend_at(double distance_m) const {

@@ -8,6 +8,7 @@
 
 #include "core/result.hpp"
 #include "dataset/dataset.hpp"
+#include "evaluation/time_gaps.hpp"
 
 namespace railfix::evaluation {
 
@@ -46,11 +47,9 @@ class Truth {
   [[nodiscard]] const std::vector<dataset::TruthRow>& rows() const { return rows_; }
   /// Rows in a row that lie further apart than a second and three times as far as usual: what was between them is not
   /// known.
-  struct Gaps {
-    size_t count = 0;
-    double longest_s = 0;
-  };
-  [[nodiscard]] Gaps gaps() const;
+  [[nodiscard]] TimeGaps gaps() const { return gaps_in(stamps_of(rows_)); }
+  /// So far at most is the distance between two rows from the straight line between them, as the accelerations show.
+  [[nodiscard]] double between_rows_m() const;
   [[nodiscard]] const std::optional<std::vector<dataset::TruthLandmark>>& landmarks() const { return landmarks_; }
   [[nodiscard]] const std::optional<dataset::CameraCalibration>& calibration() const { return calibration_; }
   [[nodiscard]] Stretch whole() const { return {rows_.front().stamp_ns, rows_.back().stamp_ns}; }
