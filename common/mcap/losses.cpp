@@ -15,6 +15,15 @@ Losses losses_of(const Reader& damaged, uint64_t messages) {
   return losses;
 }
 
+std::string told(const Losses& losses) {
+  const auto counted = [](uint64_t count, const std::string& what) {
+    return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+  };
+  const auto samples = losses.samples ? counted(*losses.samples, "sample") : "nobody knows how many samples";
+  return samples + ", " + counted(losses.chunks, "chunk") + ", " + counted(losses.bytes, "byte") +
+         " that cannot be read";
+}
+
 Metadata repair_trace(const Losses& losses, const std::filesystem::path& damaged) {
   Metadata trace{"railfix_repair",
                  {{"file", damaged.filename().string()},

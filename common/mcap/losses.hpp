@@ -16,6 +16,9 @@ struct Losses {
 /// REQUIRES: all messages have been read, and so many came.
 Losses losses_of(const Reader& damaged, uint64_t messages);
 
+/// "3 samples, 1 chunk, 700 bytes that cannot be read".
+std::string told(const Losses& losses);
+
 /// The metadata record `railfix_repair`.
 Metadata repair_trace(const Losses& losses, const std::filesystem::path& damaged);
 

@@ -25,12 +25,17 @@ void print(const CopyReport& report, const fs::path& out) {
   std::cout << out.string() << ": " << report.samples << " samples of " << report.topics << " topics";
 }
 
+void print_lost(const CopyReport& report) {
+  if (report.lost.bytes > 0) std::cout << "; missing: " << mcap::told(report.lost);
+  std::cout << '\n';
+}
+
 int cut(const CopyOptions& options) {
   check_output("--out", options.out, options.files);
   const auto report = core::value_or_throw(cut_recording(options.files.front(), options.out, options.cut));
   print(report, options.out);
   if (report.standing > 0) std::cout << ", and " << report.standing << " values that held at the beginning";
-  std::cout << '\n';
+  print_lost(report);
   return 0;
 }
 
@@ -39,7 +44,7 @@ int merge(const CopyOptions& options) {
   const auto report = core::value_or_throw(merge_recordings(options.files, options.out));
   print(report, options.out);
   if (report.duplicates > 0) std::cout << "; " << report.duplicates << " stood in more than one, kept once";
-  std::cout << '\n';
+  print_lost(report);
   return 0;
 }
 

@@ -12,6 +12,7 @@
 #include "recording/export_track.hpp"
 #include "recording/export_video.hpp"
 #include "recording/part_in_time.hpp"
+#include "recording/topic_names.hpp"
 
 namespace railfix::tool {
 
@@ -33,13 +34,9 @@ struct ExportOptions {
 
 mcap::Selection part_of(const mcap::Reader& reader, const ExportOptions& options) {
   auto part = core::value_or_throw(part_in_time(reader, options.from_s, options.to_s));
+  core::ok_or_throw(check_topics(reader, options.topics));
   for (const auto& [id, channel] : reader.channels()) {
-    for (const auto& name : options.topics) {
-      if (channel.topic == name || channel.topic.starts_with(name + "/")) part.topics.insert(channel.topic);
-    }
-  }
-  if (part.topics.empty() && !options.topics.empty()) {
-    throw core::BadInput(reader.file().string() + " has none of the wanted topics; see `railfix recording info`");
+    if (names_topic(options.topics, channel.topic)) part.topics.insert(channel.topic);
   }
   return part;
 }

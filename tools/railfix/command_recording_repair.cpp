@@ -27,16 +27,6 @@ bool sound(const fs::path& file, const mcap::Reader& reader) {
   return reader.indexed() && reader.problems().empty() && core::value_or_throw(mcap::check(file)).problems.empty();
 }
 
-std::string counted(uint64_t count, const std::string& what) {
-  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
-}
-
-std::string missing(const RepairReport& report) {
-  const auto samples = report.lost.samples ? counted(*report.lost.samples, "sample") : "nobody knows how many samples";
-  return samples + ", " + counted(report.lost.chunks, "chunk") + ", " + counted(report.lost.bytes, "byte") +
-         " that cannot be read";
-}
-
 int repair(const RepairOptions& options) {
   const auto reader = core::value_or_throw(mcap::Reader::open(options.file));
   if (mcap::being_written(options.file)) {
@@ -57,7 +47,7 @@ int repair(const RepairOptions& options) {
   const auto report = core::value_or_throw(repair_recording(options.file, out));
   for (const auto& problem : report.problems) std::cerr << problem << '\n';
   std::cout << out.string() << ": " << report.samples << " samples of " << report.topics
-            << " topics; missing: " << missing(report) << '\n';
+            << " topics; missing: " << mcap::told(report.lost) << '\n';
   return 0;
 }
 

@@ -135,10 +135,11 @@ TEST_F(Copy, ACutHasOnlyTheTopicsOneWants) {
   EXPECT_THAT(content(out_), ElementsAre("odometry_step@10", "odometry_step@11"));
   const auto none = cut_recording(a_, folder_ / "none.mcap", {0, kAll, {"imu_sample"}, {}});
   ASSERT_FALSE(none.ok());
-  EXPECT_THAT(none.error().message, HasSubstr("it has camera_calibration, odometry_step"));
+  EXPECT_THAT(none.error().message, HasSubstr("has no topic imu_sample; there are: camera_calibration, odometry_step"));
   const auto behind = cut_recording(a_, folder_ / "none.mcap", {5, 9, {}, {}});
   ASSERT_FALSE(behind.ok());
-  EXPECT_THAT(behind.error().message, HasSubstr("there is nothing from 5 s to 9 s: " + a_.string() + " is 1.0 s long"));
+  EXPECT_THAT(behind.error().message,
+              HasSubstr("there is nothing from 5 s to 9 s: " + a_.string() + " is 1.00 s long"));
   const auto open_end = cut_recording(a_, folder_ / "none.mcap", {5, kAll, {}, {}});
   ASSERT_FALSE(open_end.ok());
   EXPECT_THAT(open_end.error().message, HasSubstr("there is nothing from 5 s to the end"));
@@ -166,6 +167,52 @@ TEST_F(Copy, LossesAddUp) {
   ASSERT_TRUE(merge_recordings({a_, b_}, out_).ok());
   const auto reader = mcap::Reader::open(out_).value();
   EXPECT_THAT(reader->metadata(), ::testing::Contains(mcap::Metadata{"railfix_losses", {{"imu_sample queue", "7"}}}));
+}
+
+TEST_F(Copy, PartsOfOneRecordingLostTheSame) {
+  {
+    auto writer = mcap::Writer::create(a_, {}).value();
+    ASSERT_TRUE(writer->write_metadata({"railfix", {{"train_id", "t"}, {"started_ns", "17"}}}).ok());
+    ASSERT_TRUE(writer->write_metadata({"railfix_losses", {{"imu_sample queue", "3"}}}).ok());
+    const auto id = writer->add_channel(0, "odometry_step", "cdr", {}).value();
+    for (int i = 0; i < 4; ++i) ASSERT_TRUE(writer->write({id, 1, i * kSecond, i * kSecond, mcap::Bytes(9, 7)}).ok());
+    ASSERT_TRUE(writer->close().ok());
+  }
+  ASSERT_TRUE(cut_recording(a_, folder_ / "1.mcap", {0, 2, {}, {}}).ok());
+  ASSERT_TRUE(cut_recording(a_, folder_ / "2.mcap", {2, 9, {}, {}}).ok());
+  ASSERT_TRUE(merge_recordings({folder_ / "1.mcap", folder_ / "2.mcap"}, out_).ok());
+  const auto reader = mcap::Reader::open(out_).value();
+  EXPECT_THAT(reader->metadata(), ::testing::Contains(mcap::Metadata{"railfix_losses", {{"imu_sample queue", "3"}}}));
+}
+
+TEST_F(Copy, WhatOneRecordingHasTwiceStays) {
+  const auto record = [&](const fs::path& file, int64_t at_s) {
+    auto writer = mcap::Writer::create(file, {}).value();
+    const auto id = writer->add_channel(0, "odometry_step", "cdr", {}).value();
+    for (int i = 0; i < 3; ++i) ASSERT_TRUE(writer->write({id, 0, (at_s + i) * kSecond, 0, mcap::Bytes(9, 7)}).ok());
+    ASSERT_TRUE(writer->close().ok());
+  };
+  record(a_, 1);
+  record(b_, 5);
+  const auto merged = merge_recordings({a_, b_}, out_);
+  ASSERT_TRUE(merged.ok()) << merged.error().message;
+  EXPECT_EQ(merged.value().samples, 3U);
+  EXPECT_EQ(merged.value().duplicates, 3U);
+}
+
+TEST_F(Copy, ATopicThatIsNotThereIsNamed) {
+  Recorded(a_, "t").step(1);
+  for (const CutOptions& options :
+       {CutOptions{0, 9, {"odometry_step", "odometry_stp"}, {}}, CutOptions{0, 9, {}, {"odometry_stp"}}}) {
+    const auto refused = cut_recording(a_, out_, options);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_THAT(refused.error().message, HasSubstr("has no topic odometry_stp; did you mean odometry_step?"));
+  }
+}
+
+TEST_F(Copy, ATopicOfRailfixNeedNotBeThereToBeLeftOut) {
+  Recorded(a_, "t").step(1);
+  EXPECT_TRUE(cut_recording(a_, out_, {0, 9, {}, {"camera_frame"}}).ok());
 }
 
 TEST_F(Copy, WhatAKilledOneLeftIsNamedAndStays) {
@@ -241,6 +288,18 @@ TEST_F(Copy, ARepairedOneSaysWhatIsMissing) {
   EXPECT_EQ(trace["lost_samples"], "1");
   EXPECT_EQ(trace["skipped_bytes"], std::to_string(repaired.value().lost.bytes));
   EXPECT_GT(repaired.value().lost.bytes, 50U);
+
+  for (const bool cut : {true, false}) {
+    Recorded(folder_ / "c.mcap", "").step(9);
+    const auto copied = cut ? cut_recording(b_, folder_ / "d.mcap", {0, 9, {}, {}})
+                            : merge_recordings({b_, folder_ / "c.mcap"}, folder_ / "e.mcap");
+    ASSERT_TRUE(copied.ok()) << copied.error().message;
+    EXPECT_EQ(copied.value().lost.chunks, 1U);
+    trace = trace_in(folder_ / (cut ? "d.mcap" : "e.mcap"));
+    EXPECT_EQ(trace["file"], "b.mcap");
+    EXPECT_EQ(trace["lost_chunks"], "1");
+    fs::remove(folder_ / "c.mcap");
+  }
 
   fs::resize_file(b_, ends[2] + 20);
   ASSERT_TRUE(repair_recording(b_, folder_ / "cut.mcap").ok());

@@ -1,11 +1,12 @@
 #include "recording/copy.hpp"
 
 #include <algorithm>
-#include <unordered_set>
+#include <unordered_map>
 
 #include "recording/copier.hpp"
 #include "recording/part_in_time.hpp"
 #include "recording/standing_values.hpp"
+#include "recording/topic_names.hpp"
 
 namespace railfix::tool {
 
@@ -16,30 +17,30 @@ namespace fs = std::filesystem;
 constexpr const char* kAbout = "railfix";
 constexpr const char* kLosses = "railfix_losses";
 
-bool named(const std::vector<std::string>& names, const std::string& topic) {
-  return std::ranges::any_of(names,
-                             [&](const std::string& name) { return topic == name || topic.starts_with(name + "/"); });
-}
-
 core::Result<std::set<std::string>> chosen_topics(const mcap::Reader& reader, const CutOptions& options) {
+  if (auto known = check_topics(reader, options.topics); !known.ok()) return known.error();
+  if (auto known = check_left_out(reader, options.without); !known.ok()) return known.error();
   std::set<std::string> topics;
-  std::string all;
   for (const auto& [id, channel] : reader.channels()) {
-    all += (all.empty() ? "" : ", ") + channel.topic;
-    if ((options.topics.empty() || named(options.topics, channel.topic)) && !named(options.without, channel.topic)) {
+    if ((options.topics.empty() || names_topic(options.topics, channel.topic)) &&
+        !names_topic(options.without, channel.topic)) {
       topics.insert(channel.topic);
     }
   }
-  if (topics.empty()) {
-    return core::Error{reader.file().string() + " has none of the wanted topics; it has " +
-                       (all.empty() ? "none" : all)};
-  }
+  if (topics.empty()) return core::Error{reader.file().string() + " has no topic that is wanted"};
   return topics;
 }
 
-void note_problems(const mcap::Reader& reader, CopyReport& report) {
+/// How many samples that were, an index of the whole recording does not say of a part.
+core::Status note_damage(const mcap::Reader& reader, Copier& copier, CopyReport& report) {
   const auto problems = problems_of(reader);
   report.problems.insert(report.problems.end(), problems.begin(), problems.end());
+  auto lost = mcap::losses_of(reader, 0);
+  lost.samples.reset();
+  if (lost.chunks == 0 && lost.bytes == 0) return {};
+  report.lost.chunks += lost.chunks;
+  report.lost.bytes += lost.bytes;
+  return copier.write(mcap::repair_trace(lost, reader.file()));
 }
 
 core::Result<mcap::Selection> part_of(const mcap::Reader& reader, const CutOptions& options) {
@@ -91,10 +92,10 @@ core::Result<CopyReport> cut_recording(const fs::path& file, const fs::path& out
     report.samples += status.ok() ? 1 : 0;
     return status.ok();
   });
+  if (status.ok()) status = note_damage(reader, copier, report);
   if (status.ok()) status = copier.close();
   if (!status.ok()) return status.error();
   report.topics = copier.topics();
-  note_problems(reader, report);
   return report;
 }
 
@@ -136,11 +137,35 @@ core::Result<std::vector<Source>> open_all(const std::vector<fs::path>& files) {
   return sources;
 }
 
+using LossCounts = std::map<std::string, uint64_t>;
+
+/// Parts of one recording, which all say what it is, have its losses in common.
+LossCounts added_up(const std::vector<std::pair<std::string, LossCounts>>& losses_of) {
+  std::map<std::string, LossCounts> by_recording;
+  for (const auto& [recording, losses] : losses_of) {
+    for (const auto& [what, count] : losses) {
+      auto& most = by_recording[recording][what];
+      most = std::max(most, count);
+    }
+  }
+  LossCounts sum;
+  for (const auto& [recording, losses] : by_recording) {
+    for (const auto& [what, count] : losses) sum[what] += count;
+  }
+  return sum;
+}
+
+/// One that says when it was begun is told from others; any other file is one of its own.
+std::string recording_of(const Source& source) {
+  const auto started = value_of(*source.reader, "started_ns");
+  return started.empty() ? source.reader->file().string() : value_of(*source.reader, "train_id") + " " + started;
+}
+
 /// Losses are counted on within a recording: its last word is its sum, and the sums add up.
 core::Status write_metadata(Copier& copier, const std::vector<Source>& sources) {
   std::vector<mcap::Metadata> written;
   mcap::Metadata merged{"railfix_merge", {}};
-  std::map<std::string, uint64_t> losses;
+  std::vector<std::pair<std::string, LossCounts>> losses_of;
   for (const auto& source : sources) {
     merged.entries["file_" + std::to_string(merged.entries.size() + 1)] = source.reader->file().filename().string();
     const mcap::Metadata* last_losses = nullptr;
@@ -152,9 +177,11 @@ core::Status write_metadata(Copier& copier, const std::vector<Source>& sources) 
       }
     }
     if (last_losses == nullptr) continue;
-    for (const auto& [what, count] : last_losses->entries) losses[what] += std::strtoull(count.c_str(), nullptr, 10);
+    auto& losses = losses_of.emplace_back(recording_of(source), LossCounts{}).second;
+    for (const auto& [what, count] : last_losses->entries) losses[what] = std::strtoull(count.c_str(), nullptr, 10);
   }
   written.push_back(merged);
+  const auto losses = added_up(losses_of);
   if (!losses.empty()) {
     written.push_back({kLosses, {}});
     for (const auto& [what, count] : losses) written.back().entries[what] = std::to_string(count);
@@ -166,21 +193,21 @@ core::Status write_metadata(Copier& copier, const std::vector<Source>& sources) 
   return {};
 }
 
-/// Tells samples from each other that are not the same one recorded twice.
+/// Tells samples that another recording has given already.
 class Seen {
  public:
-  bool first(const mcap::Channel& channel, const mcap::Message& message) {
+  bool elsewhere(const mcap::Channel& channel, const mcap::Message& message, const mcap::Reader& source) {
     mcap::Bytes what(channel.topic.begin(), channel.topic.end());
     mcap::Encoder encoder(what);
     encoder.time(message.publish_time_ns);
     encoder.u32(message.sequence);
     encoder.u32(mcap::crc32(message.data));
     const std::string_view text(reinterpret_cast<const char*>(what.data()), what.size());
-    return hashes_.insert(std::hash<std::string_view>()(text)).second;
+    return given_by_.try_emplace(std::hash<std::string_view>()(text), &source).first->second != &source;
   }
 
  private:
-  std::unordered_set<size_t> hashes_;
+  std::unordered_map<size_t, const mcap::Reader*> given_by_;
 };
 
 Source* earliest(std::vector<Source>& sources) {
@@ -210,18 +237,20 @@ core::Result<CopyReport> merge_recordings(const std::vector<fs::path>& files, co
     Source* source = earliest(sources.value());
     if (source == nullptr) break;
     const auto& channel = source->reader->channels().at(source->next->channel_id);
-    if (seen.first(channel, *source->next)) {
+    if (seen.elsewhere(channel, *source->next, *source->reader)) {
+      ++report.duplicates;
+    } else {
       status = copier.write(*source->reader, channel, *source->next);
       ++report.samples;
-    } else {
-      ++report.duplicates;
     }
     source->next = source->messages->next();
+  }
+  for (const auto& source : sources.value()) {
+    if (status.ok()) status = note_damage(*source.reader, copier, report);
   }
   if (status.ok()) status = copier.close();
   if (!status.ok()) return status.error();
   report.topics = copier.topics();
-  for (const auto& source : sources.value()) note_problems(*source.reader, report);
   return report;
 }
 

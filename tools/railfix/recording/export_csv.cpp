@@ -25,7 +25,9 @@ std::string csv_text(const std::string& text) {
 }
 
 std::string text_of(const ordered_json& value) {
-  if (value.is_null() || (value.is_number_float() && std::isnan(value.get<double>()))) return "";
+  const double number = value.is_number_float() ? value.get<double>() : 0;
+  if (value.is_null() || std::isnan(number)) return "";
+  if (std::isinf(number)) return number > 0 ? "inf" : "-inf";  // JSON has no word for it
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
@@ -42,7 +44,7 @@ std::string cell_of(const ordered_json& value) {
 /// One topic's file.
 class Table {
  public:
-  Table(const fs::path& file, const cdr::Structure& type) : csv_(file, header(type)) {}
+  Table(const fs::path& file, const std::string& header) : csv_(file, header) {}
   void add(const mcap::Message& message, const ordered_json& sample) {
     csv_ << message.log_time_ns << message.publish_time_ns << message.sequence;
     for (const auto& [name, value] : sample.items()) csv_ << cell_of(value);
@@ -52,15 +54,16 @@ class Table {
   core::Status close() { return csv_.close(); }
 
  private:
-  static std::string header(const cdr::Structure& type) {
-    std::string header = "log_time_ns,publish_time_ns,sequence";
-    for (const auto& member : type.members) {
-      if (member.name != "padding") header += "," + member.name;
-    }
-    return header;
-  }
   core::CsvWriter csv_;
 };
+
+std::string header_of(const cdr::Structure& type) {
+  std::string header = "log_time_ns,publish_time_ns,sequence";
+  for (const auto& member : type.members) {
+    if (member.name != "padding") header += "," + member.name;
+  }
+  return header;
+}
 
 /// All tables of one export, in their places or none: each has a name of its own until all are whole.
 class Tables {
@@ -69,9 +72,9 @@ class Tables {
   ~Tables() {
     if (kept_) return;
     std::error_code failed;
-    for (const auto& [topic, table] : tables_) {
-      fs::remove(draft_of(topic), failed);
-      fs::remove(file_of(topic), failed);
+    for (const auto& [name, table] : tables_) {
+      fs::remove(draft_of(name), failed);
+      fs::remove(file_of(name), failed);
     }
     if (made_) fs::remove(folder_, failed);  // only if nothing else is in it
   }
@@ -84,34 +87,48 @@ class Tables {
     return failed ? core::Status(core::Error{folder_.string() + " cannot be made (" + failed.message() + ")"})
                   : core::Status();
   }
+  /// A version of the topic's type that has other columns has a table of its own: TOPIC, TOPIC-2, ...
   Table& of(const std::string& topic, const cdr::Structure& type) {
-    const auto [place, is_new] = tables_.try_emplace(topic);
-    if (is_new) place->second = std::make_unique<Table>(draft_of(topic), type);
+    const auto header = header_of(type);
+    auto& versions = versions_[topic];
+    const auto found = std::ranges::find(versions, header);
+    const auto number = found - versions.begin() + 1;
+    if (found == versions.end()) versions.push_back(header);
+    const auto [place, is_new] = tables_.try_emplace(number == 1 ? topic : topic + "-" + std::to_string(number));
+    if (is_new) place->second = std::make_unique<Table>(draft_of(place->first), header);
     return *place->second;
   }
   core::Status keep() {
-    for (const auto& [topic, table] : tables_) {
+    for (const auto& [name, table] : tables_) {
       if (auto closed = table->close(); !closed.ok()) return closed;
     }
-    for (const auto& [topic, table] : tables_) {
-      if (auto moved = core::move_draft(draft_of(topic), file_of(topic)); !moved.ok()) return moved;
+    for (const auto& [name, table] : tables_) {
+      if (auto moved = core::move_draft(draft_of(name), file_of(name)); !moved.ok()) return moved;
     }
     kept_ = true;
     return {};
   }
+  void tell_versions(std::vector<std::string>& problems) const {
+    for (const auto& [topic, versions] : versions_) {
+      if (versions.size() > 1)
+        problems.push_back(topic + ": its type changed; each version has a table of its own, the last is " +
+                           file_of(topic + "-" + std::to_string(versions.size())).string());
+    }
+  }
   [[nodiscard]] size_t size() const { return tables_.size(); }
 
  private:
-  [[nodiscard]] fs::path file_of(std::string topic) const {
-    std::ranges::replace(topic, '/', '_');
-    return folder_ / (topic + ".csv");
+  [[nodiscard]] fs::path file_of(std::string name) const {
+    std::ranges::replace(name, '/', '_');
+    return folder_ / (name + ".csv");
   }
-  [[nodiscard]] fs::path draft_of(const std::string& topic) const { return file_of(topic).string() + ".draft"; }
+  [[nodiscard]] fs::path draft_of(const std::string& name) const { return file_of(name).string() + ".draft"; }
 
   fs::path folder_;
   bool made_ = false;
   bool kept_ = false;
   std::map<std::string, std::unique_ptr<Table>> tables_;
+  std::map<std::string, std::vector<std::string>> versions_;  // headers, by topic
 };
 
 }  // namespace
@@ -149,6 +166,7 @@ core::Result<CsvReport> export_csv(mcap::Reader& reader, const mcap::Selection& 
     return core::Error{error.what()};
   }
   report.tables = tables.size();
+  tables.tell_versions(report.problems);
   for (const auto& [of, count] : unreadable) {
     const auto& [topic, why] = of;
     report.problems.push_back(topic + ": " + std::to_string(count) + " samples were left out; " + why);

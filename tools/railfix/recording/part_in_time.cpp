@@ -14,7 +14,7 @@ core::Result<mcap::Selection> part_in_time(const mcap::Reader& reader, double fr
   if (to_s <= from_s) return core::Error{fmt::format("--to {:g} must lie behind --from {:g}", to_s, from_s)};
   if (from_s > length_s) {
     const std::string end = std::isfinite(to_s) ? fmt::format("{:g} s", to_s) : "the end";
-    return core::Error{fmt::format("there is nothing from {:g} s to {}: {} is {:.1f} s long", from_s, end,
+    return core::Error{fmt::format("there is nothing from {:g} s to {}: {} is {:.2f} s long", from_s, end,
                                    reader.file().string(), length_s)};
   }
   mcap::Selection part;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/result.hpp"
+#include "recording/topic_names.hpp"
 
 namespace railfix::tool {
 
@@ -20,13 +21,9 @@ std::string base_of(const std::string& name) {
   return name.substr(0, name.find('/'));
 }
 
-bool named(const std::vector<std::string>& names, const std::string& topic) {
-  return std::ranges::any_of(names, [&](const std::string& name) { return name == topic || name == base_of(topic); });
-}
-
 bool wanted(const ReplayOptions& options, const std::string& topic) {
-  if (named(options.without, topic)) return false;
-  return options.topics.empty() ? !kOnlyWhenNamed.contains(topic) : named(options.topics, topic);
+  if (names_topic(options.without, topic)) return false;
+  return options.topics.empty() ? !kOnlyWhenNamed.contains(topic) : names_topic(options.topics, topic);
 }
 
 std::string name_now(const ReplayOptions& options, const std::string& recorded, const messaging::TopicInfo& topic) {
@@ -60,6 +57,8 @@ void refuse_unknown_remaps(const ReplayOptions& options, const std::set<std::str
 
 ChannelChoice choose_channels(const mcap::Reader& reader, const ReplayOptions& options,
                               const std::vector<std::string>& written) {
+  core::ok_or_throw(check_topics(reader, options.topics));
+  core::ok_or_throw(check_left_out(reader, options.without));
   ChannelChoice choice;
   std::string all;
   std::set<std::string> seen;
