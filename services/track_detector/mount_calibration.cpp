@@ -20,6 +20,10 @@ constexpr double kRoughPitchesRad[] = {0.0, 0.12, 0.24};
 constexpr double kRoughYawsRad[] = {0.0, -0.2, 0.2};
 constexpr double kRoughLateralsM[] = {0.0, -0.9, 0.9};
 constexpr double kUsualLateralM = 1.0;
+// What all pictures err by alike: how rails bend upwards and downwards is taken for pitch, and the gauge of track in
+// service is a few millimetres off.
+constexpr geometry::CameraPose kShared{0, 8e-4, 4e-4, 0.002, 0.001};
+constexpr double kGaugeOffM = 0.003;
 constexpr TrackShapeSigma kRoughLimits{kRollHeldRad, 0.025, 0.04, 0.2, 0.18, 0.001, 0.0005, 3e-5};
 constexpr TrackShapeSigma kAnywhereLimits{kRollHeldRad, 0.025, 0.04, 0.2, 0.18, 0.003, 0.0005, 3e-5};
 constexpr TrackShapeSigma kFineLimits{kRollHeldRad, 0.012, 0.02, 0.10, 0.06, 0.003, 0.0005, 3e-5};
@@ -63,6 +67,22 @@ geometry::CameraPose median_pose(const std::vector<TrackObservation>& observatio
     if (spread != nullptr) spread->*member = core::kSigmaOfMedian * median(values);
   }
   return middle;
+}
+
+/// A camera swings for a second or so: pictures that follow each other closely, in this order, count less than their
+/// number (effective sample size of a first-order autoregression).
+double independent(const std::vector<double>& values) {
+  const auto count = static_cast<double>(values.size());
+  double mean = 0;
+  for (const double value : values) mean += value / count;
+  double all = 0;
+  double next = 0;
+  for (size_t i = 0; i < values.size(); ++i) {
+    all += (values[i] - mean) * (values[i] - mean);
+    if (i > 0) next += (values[i] - mean) * (values[i - 1] - mean);
+  }
+  const double alike = all > 0 ? std::clamp(next / all, 0.0, 1.0) : 0.0;
+  return std::max(1.0, count * (1 - alike) / (1 + alike));
 }
 
 }  // namespace
@@ -153,28 +173,10 @@ core::Result<MountCalibration> MountCalibrator::solve() const {
     return std::abs(o.shape.curvature_per_m) > std::max(kStraightPerM, 2 * sigma);
   });
   result.straight = seen.size();
-  const size_t wanted = std::min(kMinStraight, pictures_.size());
-  if (seen.size() < wanted) {
-    char text[200];
-    std::snprintf(
-        text, sizeof text,
-        "only %zu of %zu pictures show both rails of straight track, at least %zu are needed: take more pictures",
-        seen.size(), pictures_.size(), wanted);
-    return core::Error{text};
-  }
+  if (const auto enough = check_enough(result); !enough.ok()) return enough.error();
   geometry::CameraPose spread;
   result.mount = median_pose(seen, &spread);
-  const double count = static_cast<double>(seen.size());
-  for (const auto member : kMembers) {
-    std::vector<double> own;
-    const int k = member == &geometry::CameraPose::pitch_rad   ? 1
-                  : member == &geometry::CameraPose::yaw_rad   ? 2
-                  : member == &geometry::CameraPose::lateral_m ? 3
-                                                               : 4;
-    for (const auto& o : seen) own.push_back(std::sqrt(std::max(0.0, o.covariance(k, k))));
-    // The scatter over pictures holds the shake; a median is 1.25 times as uncertain as a mean.
-    result.sigma.*member = 1.25 * std::max(spread.*member, median(own)) / std::sqrt(count);
-  }
+  add_sigmas(seen, spread, result);
   result.mount.roll_rad = roll_rad_;
   add_lens(result);
   std::vector<double> residuals;
@@ -199,6 +201,43 @@ TrackObservation find_rails_anywhere(const geometry::Intrinsics& camera, const c
     best = std::move(observation);
   }
   return best;
+}
+
+void MountCalibrator::add_sigmas(const std::vector<TrackObservation>& seen, const geometry::CameraPose& spread,
+                                 MountCalibration& result) const {
+  for (const auto member : kMembers) {
+    std::vector<double> own;
+    std::vector<double> values;
+    const int k = member == &geometry::CameraPose::pitch_rad   ? 1
+                  : member == &geometry::CameraPose::yaw_rad   ? 2
+                  : member == &geometry::CameraPose::lateral_m ? 3
+                                                               : 4;
+    for (const auto& o : seen) {
+      own.push_back(std::sqrt(std::max(0.0, o.covariance(k, k))));
+      values.push_back(o.shape.camera.*member);
+    }
+    // The scatter over pictures holds the shake; a median is 1.25 times as uncertain as a mean.
+    const double scatter = 1.25 * std::max(spread.*member, median(own)) / std::sqrt(independent(values));
+    result.sigma.*member = std::hypot(scatter, kShared.*member);
+  }
+  result.sigma.height_m = std::hypot(result.sigma.height_m, result.mount.height_m * kGaugeOffM / gauge_m_);
+}
+
+core::Status MountCalibrator::check_enough(const MountCalibration& result) {
+  char text[300];
+  if (2 * result.seen < result.pictures) {
+    std::snprintf(text, sizeof text,
+                  "only %zu of %zu pictures show both rails where this mount would have them, so that it is not to be "
+                  "believed: give the right --focal or --camera and --gauge, and pictures in good light",
+                  result.seen, result.pictures);
+    return core::Error{text};
+  }
+  if (result.straight >= kMinStraight) return {};
+  std::snprintf(
+      text, sizeof text,
+      "only %zu of %zu pictures show both rails of straight track, at least %zu are needed: take more pictures",
+      result.straight, result.pictures, kMinStraight);
+  return core::Error{text};
 }
 
 /// A wrong principal point is taken for pitch and yaw, a wrong focal length scales their tangents.

@@ -29,7 +29,8 @@ class MountCalibrator {
 
   /// Grey pictures of the camera's size, any distance apart. All are kept until solve().
   void add(const cv::Mat& grey) { pictures_.push_back(grey); }
-  /// An error when too few pictures show straight track, or when they do not agree.
+  /// An error when fewer than three pictures show straight track, or fewer than half the rails of this mount: what was
+  /// given of the camera is wrong then.
   [[nodiscard]] core::Result<MountCalibration> solve() const;
 
  private:
@@ -37,6 +38,9 @@ class MountCalibrator {
                                                    size_t max_pictures) const;
   [[nodiscard]] core::Result<geometry::CameraPose> rough() const;
   void add_lens(MountCalibration& result) const;
+  void add_sigmas(const std::vector<TrackObservation>& seen, const geometry::CameraPose& spread,
+                  MountCalibration& result) const;
+  [[nodiscard]] static core::Status check_enough(const MountCalibration& result);
   /// The candidate that most pictures agree with.
   [[nodiscard]] geometry::CameraPose elected(const std::vector<geometry::CameraPose>& candidates) const;
 

@@ -26,6 +26,7 @@ constexpr double kAssumedFocalPerWidth = 0.72;
 constexpr size_t kMaxPictures = 120;
 constexpr size_t kFewestImuRows = 200;
 constexpr double kGravityRollSigmaRad = 0.009;  // 0.09 m/s2 of bias and of cant that is not known
+constexpr double kMostRollRad = 0.3;            // of a camera on a cab; more is an IMU with other axes
 constexpr double kTypicalRollRad = 0.0175;      // 1 degree, to say what it would do
 const cv::Scalar kMountColour(0, 230, 255);
 
@@ -65,15 +66,31 @@ std::vector<dataset::Picture> load_pictures(const std::string& path, bool quiet)
   return pictures;
 }
 
-dataset::CameraCalibration starting_calibration(const MountArguments& arguments, const cv::Size& size,
-                                                std::string& remark) {
-  dataset::CameraCalibration calibration;
+struct Lens {
+  dataset::CameraCalibration calibration{};
+  std::string remark{};
+  bool assumed = false;
+};
+
+Lens lens_of(const MountArguments& arguments, const cv::Size& size) {
+  Lens found;
+  auto& calibration = found.calibration;
   if (!arguments.camera.empty()) {
     calibration = core::value_or_throw(dataset::read_calibration(arguments.camera));
     if (calibration.intrinsics.width_px != size.width || calibration.intrinsics.height_px != size.height) {
       throw core::BadInput(arguments.camera + " is for another picture size than these pictures");
     }
-    return calibration;
+    return found;
+  }
+  const auto own = std::filesystem::is_directory(arguments.pictures)
+                       ? core::value_or_throw(dataset::find_calibration(arguments.pictures))
+                       : std::nullopt;
+  const bool fits = own && own->intrinsics.width_px == size.width && own->intrinsics.height_px == size.height;
+  if (fits && arguments.focal_px <= 0) {
+    calibration.intrinsics = own->intrinsics;
+    calibration.intrinsics_sigma = own->intrinsics_sigma;
+    found.remark = "The lens is that of " + arguments.pictures + " (sensor.yaml).";
+    return found;
   }
   auto& lens = calibration.intrinsics;
   lens.width_px = size.width;
@@ -89,9 +106,10 @@ dataset::CameraCalibration starting_calibration(const MountArguments& arguments,
         "The focal length is assumed (%.0f px, 70 degrees across): angles and every distance along the track are wrong "
         "in proportion to it, height and sideways position by some centimetres. Give --focal or --camera to fix it.",
         lens.fu_px);
-    remark = text;
+    found.remark = text;
+    found.assumed = true;
   }
-  return calibration;
+  return found;
 }
 
 // Read again, because keeping all pictures in colour would take four times the memory.
@@ -124,7 +142,16 @@ Roll roll_from_gravity(const std::string& path) {
     across += row.accel_mps2[1] / static_cast<double>(sensors.imu.size());
     up += row.accel_mps2[2] / static_cast<double>(sensors.imu.size());
   }
-  return {std::atan2(across, up), kGravityRollSigmaRad};
+  const double roll_rad = std::atan2(across, up);
+  if (std::abs(roll_rad) > kMostRollRad) {
+    char text[300];
+    std::snprintf(text, sizeof text,
+                  "%s: by its IMU the camera is rolled by %.0f degrees, so that the IMU's axes are not the camera's (y "
+                  "left, z up); leave --roll-from-imu out, or correct the axes",
+                  path.c_str(), core::deg_from_rad(roll_rad));
+    throw core::BadInput(text);
+  }
+  return {roll_rad, kGravityRollSigmaRad};
 }
 
 void put_words(cv::Mat& picture, const std::string& words, const cv::Point& at) {
@@ -239,8 +266,8 @@ int calibrate_mount(const MountArguments& arguments) {
     throw core::BadInput("--out " + arguments.out + " is there and no calibration; remove it or give another name");
   const auto pictures = load_pictures(path, arguments.json);
   const Roll roll = arguments.roll_from_imu ? roll_from_gravity(path) : Roll{};
-  std::string remark;
-  auto calibration = starting_calibration(arguments, pictures.front().grey.size(), remark);
+  Lens lens = lens_of(arguments, pictures.front().grey.size());
+  auto& calibration = lens.calibration;
   track_detector::MountCalibrator calibrator(calibration.intrinsics, arguments.gauge_m, roll.rad,
                                              calibration.intrinsics_sigma.value_or(geometry::Intrinsics{}));
   for (const auto& picture : pictures) calibrator.add(picture.grey);
@@ -260,9 +287,9 @@ int calibrate_mount(const MountArguments& arguments) {
   const auto& picture = pictures[pictures.size() / 2];
   draw(drawn, in_colour(path, picture), picture, calibration.intrinsics, *calibration.mount, arguments.gauge_m);
   if (arguments.json) {
-    std::cout << core::json_text(json_of(found.value(), calibration.intrinsics, !remark.empty()), 2) << '\n';
+    std::cout << core::json_text(json_of(found.value(), calibration.intrinsics, lens.assumed), 2) << '\n';
   } else {
-    print(found.value(), roll, remark);
+    print(found.value(), roll, lens.remark);
     std::printf("written to %s; look at %s: straight rails must lie in the yellow lines\n", arguments.out.c_str(),
                 drawn.c_str());
   }

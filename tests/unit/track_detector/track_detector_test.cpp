@@ -371,7 +371,7 @@ TEST(MountCalibration, ErrorsAreWithinTheSigmas) {
 
 TEST(MountCalibration, ARollFromElsewhereIsKept) {
   MountCalibrator calibrator(kSmall, 1.435, 0.02, {3, 3, 2, 2, 0, 0, 0, 0, 0, 0});
-  for (uint64_t i = 0; i < 2; ++i) {
+  for (uint64_t i = 0; i < 3; ++i) {
     Scene scene;
     scene.shape.camera = {0.02, 0.12, 0, 0.3, 2.5};
     calibrator.add(render(scene, kSmall, i));
@@ -381,6 +381,35 @@ TEST(MountCalibration, ARollFromElsewhereIsKept) {
   EXPECT_EQ(found.value().mount.roll_rad, 0.02);
   EXPECT_NEAR(found.value().mount.lateral_m, 0.3, 0.02);
   EXPECT_GE(found.value().sigma.pitch_rad, 2.0 / kSmall.fv_px) << "the centre's sigma is in it";
+}
+
+// Pictures of a camera that swings slowly say little more than one.
+TEST(MountCalibration, PicturesThatFollowEachOtherCountLess) {
+  const auto sigma_of = [](bool swings) {
+    MountCalibrator calibrator(kSmall, 1.435);
+    for (uint64_t i = 0; i < 8; ++i) {
+      Scene scene;
+      const double up = swings ? (i < 4 ? 1 : -1) : (i % 2 == 0 ? 1 : -1);
+      scene.shape.camera = {0, 0.12 + 0.004 * up, 0, 0, 2.5};
+      calibrator.add(render(scene, kSmall, i));
+    }
+    return railfix::core::value_or_throw(calibrator.solve()).sigma.pitch_rad;
+  };
+  EXPECT_GT(sigma_of(true), 2 * sigma_of(false));
+}
+
+// With a wrong focal length some pictures show some pair of lines at the gauge.
+TEST(MountCalibration, WhatFewPicturesShowIsNoMount) {
+  MountCalibrator calibrator(kSmall, 1.435);
+  for (uint64_t i = 0; i < 7; ++i) {
+    Scene scene;
+    scene.shape.camera = {0, 0.12, 0, 0, 2.5};
+    calibrator.add(i % 2 == 1 ? render(scene, kSmall, i) : cv::Mat(512, 640, CV_8UC1, cv::Scalar(90)));
+  }
+  const auto found = calibrator.solve();
+  ASSERT_FALSE(found.ok());
+  EXPECT_NE(found.error().message.find("only 3 of 7 pictures show both rails"), std::string::npos)
+      << found.error().message;
 }
 
 TEST(MountCalibration, CurvesAreRefused) {
