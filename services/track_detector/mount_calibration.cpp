@@ -22,7 +22,7 @@ constexpr double kRoughLateralsM[] = {0.0, -0.9, 0.9};
 constexpr double kUsualLateralM = 1.0;
 // What all pictures err by alike: how rails bend upwards and downwards is taken for pitch, and the gauge of track in
 // service is a few millimetres off.
-constexpr geometry::CameraPose kShared{0, 8e-4, 4e-4, 0.002, 0.001};
+constexpr geometry::CameraPose kShared{0, 1.5e-3, 8e-4, 0.003, 0.002};
 constexpr double kGaugeOffM = 0.003;
 constexpr TrackShapeSigma kRoughLimits{kRollHeldRad, 0.025, 0.04, 0.2, 0.18, 0.001, 0.0005, 3e-5};
 constexpr TrackShapeSigma kAnywhereLimits{kRollHeldRad, 0.025, 0.04, 0.2, 0.18, 0.003, 0.0005, 3e-5};

@@ -327,6 +327,26 @@ TEST_F(Export, AHostileDescriptionOfATypeIsRefusedWithASentence) {
                                       "cannot be read: IDL line 1: more than 32 sequences stand in each other"));
 }
 
+TEST_F(Export, ATypeThatChangedHasATableForEachVersion) {
+  const auto changed = folder_ / "changed.mcap";
+  writer_ = mcap::Writer::create(changed, {}).value();
+  uint8_t number = 0;
+  for (const char* type : {"struct T { octet speed; octet way; };", "struct T { octet way; octet speed; };"}) {
+    const auto schema = writer_->add_schema("T", "omgidl", type).value();
+    const auto channel = writer_->add_channel(schema, "foo", "cdr", {}).value();
+    ++number;
+    ASSERT_TRUE(writer_->write({channel, number, kBegin, kBegin, std::vector<uint8_t>{0, 1, 0, 0, number, 9}}).ok());
+  }
+  ASSERT_TRUE(writer_->close().ok());
+  const auto tables = folder_ / "tables";
+  const auto exported = recording({"export", changed.string(), "--csv", tables.string()});
+  EXPECT_THAT(exported.err, HasSubstr("foo: its type changed; each version has a table of its own, the last is " +
+                                      (tables / "foo-2.csv").string()));
+  EXPECT_THAT(test::slurp(tables / "foo.csv"), HasSubstr(",speed,way\n"));
+  EXPECT_THAT(test::slurp(tables / "foo-2.csv"), HasSubstr(",way,speed\n"));
+  EXPECT_THAT(test::slurp(tables / "foo-2.csv"), HasSubstr(",2,2,9\n"));
+}
+
 TEST_F(Export, NothingOfOtherWritersFilesIsLeftOut) {
   for (unsigned bits = 0; bits < test::OtherSummary::kCombinations; bits += 3) {
     const auto other = folder_ / "other.mcap";
