@@ -130,8 +130,8 @@ void print_services(std::ostream& out, const std::vector<ServiceResult>& service
     line(out, s.service,
          "in " + count(s.frames_in) + ", out " + count(s.frames_out) + ", dropped " + count(s.dropped) +
              (s.restarts > 0 ? ", started anew " + std::to_string(s.restarts) + " times" : "") + ", latency p50 " +
-             ms(s.latency_p50_ms) + " p99 " + ms(s.latency_p99_ms) + ", cpu " + figure(s.cpu_percent, "%.1f", " %") +
-             ", " + figure(s.rss_mb, "%.0f", " MB") + ", " + s.last_state);
+             ms(s.latency_p50_ms) + ", of the worst second p99 " + ms(s.latency_p99_ms) + ", cpu " +
+             figure(s.cpu_percent, "%.1f", " %") + ", " + figure(s.rss_mb, "%.0f", " MB") + ", " + s.last_state);
   }
 }
 
