@@ -97,8 +97,14 @@ void Estimator::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
   // What was felt goes on when the wheel begins to turn and is found out.
   const bool told = measures(Source::wheel) || (watch(Source::wheel).isolated && felt_.faster_mps() != 0);
   const bool alone = sees() ? !measures(Source::wheel) : blind && told;
-  if (!alone || dt_s > kLatelyS) {
+  const bool goes_on = felt_.faster_mps() != 0 && in_the_dark();  // it may come back as wrong as it went
+  if ((!alone && !goes_on) || dt_s > kLatelyS) {
     felt_ = {};
+    return;
+  }
+  if (!alone) {
+    felt_.pause();
+    unwatched_.felt.add(felt_.faster_mps() * dt_s);
     return;
   }
   felt_.add({dt_s, accel_mps2, sigma_mps2, filter_.value(StateIndex::accel_bias), filter_.sigma(StateIndex::accel_bias),

@@ -7,7 +7,7 @@ namespace railfix::fusion {
 namespace {
 
 constexpr double kWindowS = 2.0;
-constexpr double kApartSigmas = 5.0;
+constexpr double kApartSigmas = 4.0;
 constexpr double kCalmSigmas = 1.0;
 
 }  // namespace

@@ -23,6 +23,8 @@ struct FeltInput {
 class FeltMotion {
  public:
   void add(const FeltInput& input);
+  /// No odometer says how fast the train runs for now.
+  void pause() { last_mps_.reset(); }
   /// The train is felt to run so much faster than the odometer says; 0 = as fast.
   [[nodiscard]] double faster_mps() const { return bias_mps2_ ? lean_mps_ : 0.0; }
 
