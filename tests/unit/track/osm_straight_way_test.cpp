@@ -54,8 +54,8 @@ class OsmStraightWayTest : public ImportTest {
   static std::vector<std::string> straight_way(const Map& map) {
     std::vector<std::string> out;
     for (const Connection& way : map.connections) {
-      const Node* node = map.node(way.node);
-      if (way.diverging || std::hypot(node->easting_m - 500000, node->northing_m - 5340000) > 0.1) continue;
+      const Node& node = map.nodes[way.node - 1];
+      if (way.diverging || std::hypot(node.easting_m - 500000, node.northing_m - 5340000) > 0.1) continue;
       for (const uint32_t edge : {way.edge_a, way.edge_b}) out.push_back(map.edge(edge)->name);
     }
     std::ranges::sort(out);
