@@ -15,7 +15,7 @@ constexpr double kOfRealRuns = 1.07;
 constexpr double kWidestRowM = 1000;
 constexpr double kNarrowestRowM = 60;
 constexpr double kSightedFromM = 20;  // a train that begins there has passed what is nearer
-constexpr double kMarkerBesideM = 3;
+constexpr double kMarkerBesideM = 3;  // on either side
 constexpr double kLeastWayM = 1;
 
 /// Where a way runs over a track for the second time, as on a ring; nothing where it does not.
