@@ -15,6 +15,11 @@ constexpr double kTouchM = 0.05;
 constexpr double kTouchRad = 0.02;
 constexpr double kNeighbourM = 50.0;
 constexpr double kLeavingM = 5.0;
+// By how much more the straight way may turn than another one. Drawn by hand, tracks are off by a degree or two; a
+// sharp turnout bends by more than four over the same metres.
+constexpr double kSameLineRad = kTouchRad;
+constexpr double kSameWayRad = core::rad_from_deg(2.0);
+constexpr double kRunningLineRad = core::rad_from_deg(2.0);
 
 struct End {
   size_t track = 0;
@@ -139,8 +144,7 @@ void take_marks(const ImportedTrack& track, double from_m, double to_m, bool is_
 struct Pair {
   size_t a = 0;
   size_t b = 0;
-  double turn_rad = 0;
-  bool same_line = false;
+  double cost_rad = 0;
   bool diverging = false;
 };
 
@@ -154,23 +158,38 @@ std::optional<ToldWay> told_way(const DraftNode& node, const EdgeEnd& a, const E
   return std::nullopt;
 }
 
+double turn_between_rad(double leaving_a_rad, double leaving_b_rad) {
+  return std::abs(core::wrap_pi(leaving_b_rad - leaving_a_rad - core::kPi));
+}
+
+double bonus_for_line_rad(const std::string& a, const std::string& b) {
+  return !a.empty() && a == b ? kSameLineRad : 0.0;
+}
+
+/// The turn from one end to the other, less for what belongs together. Trains are taken for going straight on until
+/// something tells, and most of them follow the line and not the crossover that leaves it.
+double cost_rad(const Draft& draft, const EdgeEnd& a, const EdgeEnd& b) {
+  if (!a.onward || !b.onward) {
+    return turn_between_rad(a.leaving_rad, b.leaving_rad) -
+           bonus_for_line_rad(draft.edges[a.edge].track.line, draft.edges[b.edge].track.line);
+  }
+  const bool same_way = a.onward->way == b.onward->way;
+  const bool running = a.onward->is_running_line && b.onward->is_running_line;
+  return turn_between_rad(a.onward->heading_rad, b.onward->heading_rad) - (running ? kRunningLineRad : 0.0) -
+         (same_way ? kSameWayRad : bonus_for_line_rad(a.onward->line, b.onward->line));
+}
+
 std::vector<Pair> possible_pairs(const Draft& draft, const DraftNode& node, const std::vector<EdgeEnd>& ends) {
   std::vector<Pair> pairs;
   for (size_t a = 0; a < ends.size(); ++a) {
     for (size_t b = a + 1; b < ends.size(); ++b) {
-      const double turn = std::abs(core::wrap_pi(ends[b].leaving_rad - ends[a].leaving_rad - core::kPi));
       const auto way = told_way(node, ends[a], ends[b]);
-      if (node.ways_are_told ? !way : turn > kSharpestTurnRad) continue;
-      const std::string& line = draft.edges[ends[a].edge].track.line;
-      pairs.push_back(
-          {a, b, turn, !line.empty() && line == draft.edges[ends[b].edge].track.line, way && way->diverging});
+      const bool too_sharp = turn_between_rad(ends[a].leaving_rad, ends[b].leaving_rad) > kSharpestTurnRad;
+      if (node.ways_are_told ? !way : too_sharp) continue;
+      pairs.push_back({a, b, cost_rad(draft, ends[a], ends[b]), way && way->diverging});
     }
   }
-  // A line's own pieces first where the turn does not tell them apart, else the smallest turn.
-  std::sort(pairs.begin(), pairs.end(), [](const Pair& x, const Pair& y) {
-    const auto cost = [](const Pair& pair) { return pair.turn_rad - (pair.same_line ? kTouchRad : 0.0); };
-    return cost(x) < cost(y);
-  });
+  std::sort(pairs.begin(), pairs.end(), [](const Pair& x, const Pair& y) { return x.cost_rad < y.cost_rad; });
   return pairs;
 }
 
@@ -187,8 +206,9 @@ NodeKind kind_of(const DraftNode& node, size_t ends, const std::vector<WayOver>&
 std::vector<std::vector<EdgeEnd>> ends_at_nodes(const Draft& draft) {
   std::vector<std::vector<EdgeEnd>> ends(draft.nodes.size());
   for (size_t i = 0; i < draft.edges.size(); ++i) {
-    ends[draft.edges[i].from_node].push_back({i, false, draft.edges[i].leaving_from_rad});
-    ends[draft.edges[i].to_node].push_back({i, true, draft.edges[i].leaving_to_rad});
+    const DraftEdge& edge = draft.edges[i];
+    ends[edge.from_node].push_back({i, false, edge.leaving_from_rad, edge.onward_from});
+    ends[edge.to_node].push_back({i, true, edge.leaving_to_rad, edge.onward_to});
   }
   return ends;
 }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,6 +34,14 @@ struct DraftNode {
   std::vector<ToldWay> ways{};  // else they follow from the directions of the edges
 };
 
+/// How a track runs on from a node, where the source tells more than the direction of its first metres.
+struct Onward {
+  double heading_rad = 0;  // over some tens of metres
+  int64_t way = 0;         // pieces of one way of the source
+  std::string line{};      // there, while the edge's is that of most of it
+  bool is_running_line = false;
+};
+
 struct DraftEdge {
   ImportedTrack track;
   size_t from_node = 0;  // index into Draft::nodes
@@ -39,6 +49,8 @@ struct DraftEdge {
   // Directions in which a train leaves the node on this edge, as surveyed (before a fit smoothed them).
   double leaving_from_rad = 0;
   double leaving_to_rad = 0;
+  std::optional<Onward> onward_from{};
+  std::optional<Onward> onward_to{};
 };
 
 struct Draft {
@@ -51,6 +63,7 @@ struct EdgeEnd {
   size_t edge = 0;  // index into Draft::edges
   bool at_end = false;
   double leaving_rad = 0;
+  std::optional<Onward> onward{};
 };
 
 /// A train can run over a node from one of its ends to another; indices into the ends.
@@ -64,7 +77,8 @@ struct WayOver {
 std::vector<std::vector<EdgeEnd>> ends_at_nodes(const Draft& draft);
 
 /// Straight ways first. Two ends are connected where the source says so, or where it says nothing and the turn between
-/// them is less than 60 degrees; pieces of one line (else the smallest turn) are the straight way.
+/// them is less than 60 degrees. The smallest turn is the straight way, unless it is little smaller than that of what
+/// belongs together: pieces of a line, of a running line, of a way of the source.
 std::vector<WayOver> ways_over(const Draft& draft, size_t node, const std::vector<EdgeEnd>& ends);
 
 /// A node that lies on a track.

@@ -58,9 +58,16 @@ TEST_F(MapCommand, RefusesValuesThatMeanNothing) {
   refuses({"info", map_, "--at", ""}, "is not a place on the map");
   refuses({"coverage", map_, "--sighted", "frog,pole"},
           "--sighted: 'pole' is no kind of landmark that the camera sights; give of frog, balise, portal_in, ");
+  refuses({"coverage", map_, "--start", "1:0:-"}, "the track ends where the way begins");
   const auto seed = map({"make", "--seed", "-1", "--out", root_ / "made.map"});
   EXPECT_EQ(seed.exit_code, 2);
   EXPECT_THAT(seed.err, HasSubstr("--seed: -1 is not a whole number from 0 on"));
+}
+
+TEST_F(MapCommand, CoverageSaysHowMuchOfTheMapItLooksAt) {
+  EXPECT_THAT(map({"coverage", map_}).out,
+              HasSubstr("1.8 of the map's 2.3 km of track: from 1:0 over the straight way"));
+  EXPECT_THAT(map({"coverage", "--help"}).out, HasSubstr("The rest of the map is not looked at"));
 }
 
 TEST(Help, IsAWordToo) {

@@ -1,5 +1,6 @@
 #include "map/coverage.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/units.hpp"
@@ -84,51 +85,58 @@ TEST(Coverage, OneLandmarkAloneIsHardlyBelieved) {
 }
 
 TEST(Coverage, GapsAndWhatIsCoveredAreTheWholeWay) {
+  CoverageOptions options;
+  options.limit_m = 20;
+  const BothWays found = coverage_of(main_line(), options).now;
   for (const bool backwards : {false, true}) {
-    CoverageOptions options;
-    options.limit_m = 20;
-    const Coverage found = coverage_of(main_line(), options, backwards);
+    const Extent& extent = backwards ? found.back : found.there;
     double gaps_m = 0;
-    for (const CoverageGap& gap : found.now.gaps) {
+    for (const CoverageGap& gap : extent.gaps) {
       EXPECT_GT(gap.largest_m, 20);
       EXPECT_EQ(gap.to_m > gap.from_m, !backwards);
       gaps_m += std::abs(gap.to_m - gap.from_m);
     }
     EXPECT_GT(gaps_m, 100);
-    EXPECT_NEAR(gaps_m + found.now.covered_m, 1800, 1e-6);
+    EXPECT_NEAR(gaps_m + extent.covered_m, 1800, 1e-6);
   }
 }
 
 TEST(Coverage, IsTheSameForATrainThatMeetsTheSame) {
   CoverageOptions options;
   options.limit_m = 20;
-  const Coverage there = coverage_of(line_with({frog_at(300), frog_at(600), frog_at(700)}), options);
-  const Coverage back = coverage_of(line_with({frog_at(800), frog_at(900), frog_at(1200)}), options, true);
-  EXPECT_NEAR(back.now.covered_m, there.now.covered_m, 1e-6);
-  ASSERT_EQ(back.now.gaps.size(), there.now.gaps.size());
-  for (size_t i = 0; i < there.now.gaps.size(); ++i)
-    EXPECT_NEAR(back.now.gaps[i].from_m, kLineM - there.now.gaps[i].from_m, 1e-6);
-  ASSERT_EQ(back.markers_m.size(), there.markers_m.size());
-  for (size_t i = 0; i < there.markers_m.size(); ++i) EXPECT_NEAR(back.markers_m[i], kLineM - there.markers_m[i], 1e-6);
+  const Extent there = coverage_of(line_with({frog_at(300), frog_at(600), frog_at(700)}), options).now.there;
+  const Extent back = coverage_of(line_with({frog_at(800), frog_at(900), frog_at(1200)}), options).now.back;
+  EXPECT_NEAR(back.covered_m, there.covered_m, 1e-6);
+  ASSERT_EQ(back.gaps.size(), there.gaps.size());
+  for (size_t i = 0; i < there.gaps.size(); ++i) EXPECT_NEAR(back.gaps[i].from_m, kLineM - there.gaps[i].from_m, 1e-6);
 }
 
-TEST(Coverage, WhatItProposesHelps) {
+// The start is told to no better, and by the first picture that is believed the interval is shorter.
+TEST(Coverage, AStandingTrainIsNoGap) {
+  CoverageOptions options;
+  const auto promised = promised_on(line_with({}), options);
+  const auto moving = std::ranges::find_if(promised, [](const PromisedPlace& place) { return place.at_m > 0; });
+  ASSERT_GT(promised.front().half_m, moving->half_m);
+  options.limit_m = 0.5 * (promised.front().half_m + moving->half_m);
+  for (const CoverageGap& gap : coverage_of(line_with({}), options).now.there.gaps) EXPECT_GT(gap.to_m, gap.from_m);
+}
+
+TEST(Coverage, WhatItProposesHelpsBothWays) {
   const Coverage found = coverage_of(line_with({}), {});
   ASSERT_FALSE(found.markers_m.empty());
-  EXPECT_LT(found.now.covered_m, 400);
-  EXPECT_TRUE(found.with_markers.gaps.empty());
-  EXPECT_LE(found.with_markers.largest_m, 10);
+  EXPECT_LT(found.now.there.covered_m, 400);
+  EXPECT_TRUE(found.with_markers.there.gaps.empty() && found.with_markers.back.gaps.empty());
   std::vector<track::Landmark> masts;
   for (const double at_m : found.markers_m)
     masts.push_back({static_cast<uint32_t>(masts.size() + 1), track::LandmarkKind::mast, 1, at_m, -3, 0.1, ""});
-  EXPECT_LE(largest(promised_on(line_with(masts), {})), 10);
+  for (const bool backwards : {false, true}) EXPECT_LE(largest(promised_on(line_with(masts), {}, backwards)), 10);
 }
 
 TEST(Coverage, NothingHelpsAgainstALimitThatFusionNeverPromises) {
   CoverageOptions options;
   options.limit_m = 0.4;
   const Coverage found = coverage_of(line_with({}), options);
-  EXPECT_NEAR(found.now.covered_m, 0, 1e-6);
+  EXPECT_NEAR(found.now.there.covered_m, 0, 1e-6);
   EXPECT_TRUE(found.markers_m.empty());
 }
 
@@ -181,6 +189,9 @@ TEST(Coverage, AWayHasALength) {
   EXPECT_NEAR(core::value_or_throw(way_from(map, {1, 0, Direction::forward}, 500)).end_m(), 500, 1e-9);
   for (const double length_m : {0.0, -5.0, std::nan("")})
     EXPECT_FALSE(way_from(map, {1, 0, Direction::forward}, length_m).ok()) << length_m;
+  const auto nothing_ahead = way_from(map, {1, 0, Direction::reverse}, 1e7);
+  ASSERT_FALSE(nothing_ahead.ok());
+  EXPECT_THAT(nothing_ahead.error().message, testing::HasSubstr("the track ends where the way begins"));
 }
 
 }  // namespace

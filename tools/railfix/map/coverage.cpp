@@ -14,8 +14,9 @@ namespace {
 constexpr double kOfRealRuns = 1.07;
 constexpr double kWidestRowM = 1000;
 constexpr double kNarrowestRowM = 60;
-constexpr double kSightedFromM = 20;   // a train that begins there has passed what is nearer
-constexpr double kMarkerBesideM = -3;  // right
+constexpr double kSightedFromM = 20;  // a train that begins there has passed what is nearer
+constexpr double kMarkerBesideM = 3;  // on either side
+constexpr double kLeastWayM = 1;
 
 /// Where a way runs over a track for the second time, as on a ring; nothing where it does not.
 std::optional<double> until_it_comes_again(const track::Path& path) {
@@ -99,46 +100,75 @@ Extent extent_of(const RideWay& way, const CoverageOptions& options) {
     out.gaps.back().to_m = way.length_m;
     out.covered_m -= way.length_m - before_m;
   }
+  // A train that still stands where it begins has run nothing.
+  std::erase_if(out.gaps, [](const CoverageGap& gap) { return gap.to_m <= gap.from_m; });
   return out;
 }
 
-// Fusion believes none of the last two: the third of a row lies where the interval would be too long.
-void add_row(const CoverageGap& gap, double every_m, double sigma_m, RideWay& way, std::vector<double>& markers_m) {
-  const auto by_place = [](const track::Landmark& a, const track::Landmark& b) { return a.offset_m < b.offset_m; };
-  const int places = 2 + static_cast<int>(std::ceil((gap.to_m - gap.from_m) / every_m));
-  for (int i = 0; i < places; ++i) {
-    const double at_m = gap.from_m + (i - 2) * every_m;
-    const auto is_near = [&](const track::Landmark& mark) { return std::abs(mark.offset_m - at_m) < 0.5 * every_m; };
-    if (at_m < kSightedFromM || std::ranges::any_of(way.landmarks, is_near)) continue;
+/// A train on the path, or back on it, and what of it is proposed so far.
+struct Ride {
+  Ride(const track::Path& path, const CoverageOptions& options, bool backwards)
+      : running(path, backwards), way(running.way(options)), extent(extent_of(way, options)) {}
+
+  void put_marker(double path_m, double sigma_m) {
     const track::Landmark marker{.kind = track::LandmarkKind::mast,
-                                 .offset_m = at_m,
+                                 .offset_m = running.run_m(path_m),
                                  .lateral_m = kMarkerBesideM,
                                  .sigma_m = sigma_m,
                                  .name = {}};
+    const auto by_place = [](const track::Landmark& a, const track::Landmark& b) { return a.offset_m < b.offset_m; };
     way.landmarks.insert(std::ranges::upper_bound(way.landmarks, marker, by_place), marker);
-    markers_m.push_back(at_m);
   }
+
+  Running running;
+  RideWay way;
+  Extent extent;
+};
+
+/// Places on the path. Fusion believes none of the last two: the third of a row lies where the interval would be too
+/// long.
+std::vector<double> row_for(const Ride& ride, double every_m) {
+  std::vector<double> row_m;
+  for (const CoverageGap& gap : ride.extent.gaps) {
+    const int places = 2 + static_cast<int>(std::ceil((gap.to_m - gap.from_m) / every_m));
+    for (int i = 0; i < places; ++i) {
+      const double at_m = gap.from_m + (i - 2) * every_m;
+      const auto is_near = [&](double other_m) { return std::abs(other_m - at_m) < 0.5 * every_m; };
+      if (at_m < kSightedFromM || std::ranges::any_of(ride.way.landmarks, is_near, &track::Landmark::offset_m) ||
+          std::ranges::any_of(row_m, is_near))
+        continue;
+      row_m.push_back(at_m);
+    }
+  }
+  for (double& at_m : row_m) at_m = ride.running.path_m(at_m);
+  return row_m;
 }
 
-// Rows are made closer only where the wider ones do not help.
-void propose_markers(RideWay way, const CoverageOptions& options, Coverage& out) {
-  out.with_markers = out.now;
-  for (double every_m = kWidestRowM; every_m > kNarrowestRowM && !out.with_markers.gaps.empty(); every_m /= 2) {
-    for (const CoverageGap& gap : out.with_markers.gaps)
-      add_row(gap, every_m, options.marker_sigma_m, way, out.markers_m);
-    out.with_markers = extent_of(way, options);
+/// Rows are made closer only where the wider ones do not help; what one direction has serves the other.
+std::vector<double> propose_markers(Ride& there, Ride& back, const CoverageOptions& options) {
+  std::vector<double> markers_m;
+  for (double every_m = kWidestRowM; every_m > kNarrowestRowM; every_m /= 2) {
+    for (Ride* needy : {&there, &back}) {
+      const std::vector<double> row_m = row_for(*needy, every_m);
+      if (row_m.empty()) continue;
+      markers_m.insert(markers_m.end(), row_m.begin(), row_m.end());
+      for (Ride* ride : {&there, &back}) {
+        for (const double at_m : row_m) ride->put_marker(at_m, options.marker_sigma_m);
+        ride->extent = extent_of(ride->way, options);
+      }
+    }
   }
-  std::ranges::sort(out.markers_m);
-  if (out.with_markers.covered_m > out.now.covered_m) return;
-  out.markers_m.clear();
-  out.with_markers = out.now;
+  std::ranges::sort(markers_m);
+  return markers_m;
 }
 
-void put_on_path(const Running& running, Extent& extent) {
-  for (CoverageGap& gap : extent.gaps) {
-    gap.from_m = running.path_m(gap.from_m);
-    gap.to_m = running.path_m(gap.to_m);
+Extent on_path(const Ride& ride) {
+  Extent out = ride.extent;
+  for (CoverageGap& gap : out.gaps) {
+    gap.from_m = ride.running.path_m(gap.from_m);
+    gap.to_m = ride.running.path_m(gap.to_m);
   }
+  return out;
 }
 
 }  // namespace
@@ -153,6 +183,9 @@ core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const 
   if (!(length_m > 0)) return core::Error{"--length must be more than 0 m"};
   const auto path = track::Path::follow(map, start, length_m, 0);
   if (!path.ok()) return path;
+  if (path.value().end_m() - path.value().begin_m() < std::min(length_m, kLeastWayM))
+    return core::Error{
+        "the track ends where the way begins; begin elsewhere, or run the other way (EDGE:OFFSET:+ or :-)"};
   const auto lap_m = until_it_comes_again(path.value());
   return lap_m ? track::Path::follow(std::move(map), start, std::min(*lap_m, length_m), 0) : path;
 }
@@ -178,16 +211,15 @@ std::vector<PromisedPlace> promised_on(const track::Path& path, const CoverageOp
   return promised_on(Running(path, backwards).way(options), options);
 }
 
-Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards) {
-  const Running running(path, backwards);
-  RideWay way = running.way(options);
-  Coverage out;
-  out.now = extent_of(way, options);
-  propose_markers(std::move(way), options, out);
-  put_on_path(running, out.now);
-  put_on_path(running, out.with_markers);
-  for (double& at_m : out.markers_m) at_m = running.path_m(at_m);
-  return out;
+Coverage coverage_of(const track::Path& path, const CoverageOptions& options) {
+  Ride there(path, options, false);
+  Ride back(path, options, true);
+  const BothWays now{on_path(there), on_path(back)};
+  Coverage out{.now = now, .markers_m = propose_markers(there, back, options), .with_markers = {}};
+  out.with_markers = {on_path(there), on_path(back)};
+  const auto covered_m = [](const BothWays& ways) { return ways.there.covered_m + ways.back.covered_m; };
+  if (covered_m(out.with_markers) > covered_m(out.now)) return out;
+  return {.now = now, .markers_m = {}, .with_markers = now};
 }
 
 }  // namespace railfix::tool

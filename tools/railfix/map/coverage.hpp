@@ -45,13 +45,20 @@ struct Extent {
   std::vector<CoverageGap> gaps{};  // as the train meets them
 };
 
-struct Coverage {
-  Extent now;
-  std::vector<double> markers_m;  // places on the path for what would help, as the train meets them
-  Extent with_markers;
+/// There and back: both stand at the path's places.
+struct BothWays {
+  Extent there;
+  Extent back;
 };
 
-/// The straight way from a place, as long as asked for or to the end of the track; a length must be more than 0 m.
+struct Coverage {
+  BothWays now;
+  std::vector<double> markers_m;  // places on the path for what would help
+  BothWays with_markers;
+};
+
+/// The straight way from a place, as long as asked for or to the end of the track; a length must be more than 0 m, and
+/// the track must not end at once.
 core::Result<track::Path> way_from(std::shared_ptr<const track::Map> map, const track::EdgePosition& start,
                                    double length_m);
 
@@ -61,8 +68,8 @@ References references_on(const track::Path& path, const CoverageOptions& options
 /// sensors err by something.
 std::vector<PromisedPlace> promised_on(const track::Path& path, const CoverageOptions& options, bool backwards = false);
 
-/// The path is run from its begin (backwards: from its end), where fusion is told to be. Markers are proposed where
-/// they make the interval hold the limit on more of the way.
-Coverage coverage_of(const track::Path& path, const CoverageOptions& options, bool backwards = false);
+/// The path is run from its begin, and back from its end, where fusion is told to be. Markers are proposed where they
+/// make the interval hold the limit on more of the way; each serves trains of both directions.
+Coverage coverage_of(const track::Path& path, const CoverageOptions& options);
 
 }  // namespace railfix::tool

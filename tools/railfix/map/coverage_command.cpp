@@ -74,11 +74,13 @@ ordered_json extent_json(const track::Path& path, const Extent& extent) {
 }
 
 ordered_json coverage_json(const track::Path& path, const Coverage& found) {
-  ordered_json json = extent_json(path, found.now);
+  ordered_json json = extent_json(path, found.now.there);
+  json["back"] = extent_json(path, found.now.back);
   ordered_json places = ordered_json::array();
   for (const double at_m : found.markers_m) places.push_back(place_text(path, at_m));
   json["markers"] = places;
-  json["with_markers"] = extent_json(path, found.with_markers);
+  json["with_markers"] = extent_json(path, found.with_markers.there);
+  json["with_markers"]["back"] = extent_json(path, found.with_markers.back);
   return json;
 }
 
@@ -147,21 +149,27 @@ std::string within_text(const track::Path& path, const Extent& extent) {
   return text;
 }
 
-void print_coverage(const char* way_name, const track::Path& path, const Coverage& found) {
-  std::printf("within, %-8s %s\n", way_name, within_text(path, found.now).c_str());
-  for (const CoverageGap& gap : found.now.gaps) {
+void print_extent(const char* way_name, const track::Path& path, const Extent& extent) {
+  std::printf("within, %-8s %s\n", way_name, within_text(path, extent).c_str());
+  for (const CoverageGap& gap : extent.gaps) {
     std::printf("  too wide       %s to %s (%.0f m), up to %.1f m%s\n", place_text(path, gap.from_m).c_str(),
                 place_text(path, gap.to_m).c_str(), std::abs(gap.to_m - gap.from_m), gap.largest_m,
                 gap.outside_budget ? ", beyond 5 m + 5 %" : "");
   }
-  if (found.now.gaps.empty()) return;
+}
+
+void print_coverage(const track::Path& path, const Coverage& found) {
+  print_extent("there", path, found.now.there);
+  print_extent("back", path, found.now.back);
+  if (found.now.there.gaps.empty() && found.now.back.gaps.empty()) return;
   if (found.markers_m.empty()) {
-    std::printf("  would help     nothing that the camera sights\n");
+    std::printf("would help       nothing that the camera sights\n");
     return;
   }
-  std::printf("  would help     a mast, a marker or a real balise that the camera sights, at");
+  std::printf("would help       a mast, a marker or a real balise that the camera sights, for both directions at");
   for (const double at_m : found.markers_m) std::printf(" %s", place_text(path, at_m).c_str());
-  std::printf("\n  with these     %s\n", within_text(path, found.with_markers).c_str());
+  std::printf("\n  with these     there %s\n", within_text(path, found.with_markers.there).c_str());
+  std::printf("                 back %s\n", within_text(path, found.with_markers.back).c_str());
 }
 
 int coverage(const CoverageRequest& request) {
@@ -171,23 +179,20 @@ int coverage(const CoverageRequest& request) {
   const track::Path path = core::value_or_throw(way_from(map, start, request.length_m));
   const References references = references_on(path, options);
   const Coverage found = coverage_of(path, options);
-  const Coverage back = coverage_of(path, options, true);
   const double way_m = path.end_m() - path.begin_m();
   if (request.as_json) {
-    ordered_json json{{"way_m", way_m}, {"references", references_json(references)}};
+    ordered_json json{{"way_m", way_m}, {"map_m", total_length_m(*map)}, {"references", references_json(references)}};
     json.update(coverage_json(path, found));
-    json["back"] = coverage_json(path, back);
     json["without_balise_group"] = groups_json(path, group_gaps(path, options));
     print_json(json);
     return 0;
   }
-  std::printf("way              %.1f km from %s over the straight way of every switch\n", way_m / 1e3,
-              request.start.c_str());
+  std::printf("way              %.1f of the map's %.1f km of track: from %s over the straight way of every switch\n",
+              way_m / 1e3, total_length_m(*map) / 1e3, request.start.c_str());
   print_references(references);
   std::printf("limit            %.1f m on either side at %.0f km/h without GNSS, %.1f sigma\n", options.limit_m,
               request.speed_kmh, options.fusion.interval_factor);
-  print_coverage("there", path, found);
-  print_coverage("back", path, back);
+  print_coverage(path, found);
   print_groups(path, group_gaps(path, options), request);
   return 0;
 }
@@ -198,10 +203,11 @@ void add_map_coverage(CLI::App& map, Action& chosen) {
   const auto request = std::make_shared<CoverageRequest>();
   CLI::App* command = map.add_subcommand(
       "coverage",
-      "Where references are missing: the confidence interval outgrows a limit, or balise groups are far apart");
+      "Where references are missing on a way through the map: the confidence interval outgrows a limit, or balise "
+      "groups are far apart");
   command->add_option("MAP", request->map, "A map made by `railfix map build`")->required();
   command->add_option("--start", request->start, "EDGE:OFFSET[:+|-] where the way begins")->capture_default_str();
-  command->add_option("--length", request->length_m, "Metres of way; the whole line without");
+  command->add_option("--length", request->length_m, "Metres of way; without, to where its track ends");
   command->add_option("--limit", request->options.limit_m, "Metres that half the interval may be long")
       ->check(number_between(0.1, 1e5))
       ->capture_default_str();
@@ -233,6 +239,9 @@ void add_map_coverage(CLI::App& map, Action& chosen) {
       ->capture_default_str();
   command->add_flag("--json", request->as_json, "JSON on standard output");
   command->footer(
+      "It looks at one way, there and back: over the straight way of every switch from --start on. The rest of the map "
+      "is "
+      "not looked at; the output says how much of it the way is.\n"
       "Example:\n  railfix map coverage line.map --start 1:0 --limit 15 --sighted frog,portal_in,portal_out");
   command->callback([request, &chosen] { chosen = [request] { return coverage(*request); }; });
 }

@@ -67,6 +67,8 @@ bool is_mast(const OsmTags& tags);
 bool is_set(const OsmTags& tags, const char* key);
 /// Empty where there is no such key.
 std::string value_of(const OsmTags& tags, const char* key);
+/// The name of a track's line, else its number.
+std::string line_in(const OsmTags& tags);
 
 /// The ways among which this one belongs; nullptr = it is of no use.
 std::vector<OsmWay>* ways_for(OsmData& data, const OsmTags& tags, bool with_trams);

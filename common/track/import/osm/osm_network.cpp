@@ -9,6 +9,7 @@
 #include "track/import/osm/osm_chains.hpp"
 #include "track/import/osm/osm_heights.hpp"
 #include "track/import/osm/osm_node_marks.hpp"
+#include "track/import/osm/osm_onward.hpp"
 #include "track/import/osm/osm_overbridges.hpp"
 #include "track/import/osm/osm_trackside.hpp"
 #include "track/import/told.hpp"
@@ -47,7 +48,8 @@ class Builder {
     find_usual_sigma();
     gather_ends();
     for (const auto& [node, ends] : ends_) agree_on_tangents(ends);
-    for (OsmChain& chain : chains_) add_edge(chain);
+    const OsmOnward onward(data_, chains_);
+    for (const OsmChain& chain : chains_) add_edge(chain, onward);
     add_heights(data_, chains_, out_.draft, out_.problems);
     add_marks_at_nodes(data_, chains_, out_.draft, points_);
     add_trackside();
@@ -143,7 +145,7 @@ class Builder {
     return entry->second;
   }
 
-  void add_edge(OsmChain& chain) {
+  void add_edge(const OsmChain& chain, const OsmOnward& onward) {
     const std::optional<ClothoidFit> smooth = clothoids(chain);
     PolylineFit fit;
     if (smooth) {
@@ -173,6 +175,8 @@ class Builder {
     const std::vector<Eigen::Vector2d>& kept = chain.shape;
     edge.leaving_from_rad = heading_of(kept[1] - kept[0]);
     edge.leaving_to_rad = heading_of(kept[kept.size() - 2] - kept.back());
+    edge.onward_from = onward.of(chain, false);
+    edge.onward_to = onward.of(chain, true);
     out_.figures.include(fit.figures);
     for (const Eigen::Vector2d& point : chain.points) {
       const double distance = std::abs(edge.track.alignment.nearest(point.x(), point.y()).lateral_m);
@@ -205,14 +209,10 @@ class Builder {
     out_.problems.push_back("edge " + track + " has " + told_left_out(fit.left_out, fit.left_out_max_m));
   }
 
-  /// The name (else the number) of the way with most segments of the chain.
+  /// That of the ways with most segments of the chain.
   [[nodiscard]] std::string line_of(const OsmChain& chain) const {
     std::map<std::string, size_t> votes;
-    for (const size_t way : chain.ways) {
-      const OsmTags& tags = data_.ways[way].tags;
-      const std::string name = value_of(tags, "name");
-      ++votes[name.empty() ? value_of(tags, "ref") : name];
-    }
+    for (const size_t way : chain.ways) ++votes[line_in(data_.ways[way].tags)];
     return std::max_element(votes.begin(), votes.end(),
                             [](const auto& a, const auto& b) { return a.second < b.second; })
         ->first;

@@ -209,6 +209,11 @@ std::string value_of(const OsmTags& tags, const char* key) {
   return found == tags.end() ? std::string() : found->second;
 }
 
+std::string line_in(const OsmTags& tags) {
+  const std::string name = value_of(tags, "name");
+  return name.empty() ? value_of(tags, "ref") : name;
+}
+
 bool is_set(const OsmTags& tags, const char* key) {
   const std::string value = value_of(tags, key);
   return !value.empty() && value != "no" && value != "0" && value != "false";
