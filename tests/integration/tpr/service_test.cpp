@@ -162,6 +162,15 @@ TEST_F(TprService, AValueOfTheOnboardUnitThatIsNoneTakesNothingAlong) {
   EXPECT_EQ(said.q_length, uint32_t{etcs::kIntegrityLost});
 }
 
+TEST_F(TprService, ThatModeAndLevelAreAssumedStandsInTheLog) {
+  const auto log = std::filesystem::temp_directory_path() / (train_ + ".log");
+  test::Program program(service({"common.log_level=warning"}), {{}, log, {}});
+  ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+  const auto said = [&] { return test::slurp(log).find("nobody has sent onboard_status") != std::string::npos; };
+  EXPECT_TRUE(run_until(said, [&] { write_state(450); })) << test::slurp(log);
+  std::filesystem::remove(log);
+}
+
 // The clock of the other host is 5 s ahead, as its reports say.
 TEST_F(TprService, TrainborneTimeGoesOnWhereTheOtherOneReported) {
   messaging::Writer<msg::TrainPositionReport> other(participant_, topics::train_position_report);
