@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "tpr_publisher/position_report.hpp"
 #include "track/path.hpp"
 
 namespace railfix::tpr_publisher {
@@ -37,11 +38,9 @@ std::optional<double> distance_on(const track::Path& path, const EdgePosition& f
   return std::nullopt;
 }
 
-/// The train may have come by any of the ways: their lengths differ by so much from this one at most.
-double most_apart_m(const std::vector<WayBetween>& ways, double length_m) {
-  double apart_m = 0;
-  for (const auto& way : ways) apart_m = std::max(apart_m, std::abs(way.length_m - length_m));
-  return apart_m;
+/// The same group, and the train looks the same way at it.
+bool agree(const std::optional<Reference>& reference, const Reference& before) {
+  return reference && reference->group == before.group && orientation(*reference) == orientation(before);
 }
 
 /// A train that runs on that way comes to the group.
@@ -69,6 +68,7 @@ void BaliseTracker::update(const EdgePosition& place, bool declared, bool heard)
   if (edge == nullptr || !std::isfinite(place.offset_m)) return lose();
   EdgePosition foot = place;
   foot.offset_m = std::clamp(foot.offset_m, 0.0, edge->alignment.length_m());
+  const auto before = reference_;
   if (!heard && last_) {  // over which leg it went meanwhile nobody knows
     const auto step = step_to(foot);
     if (!step || step->divides) lose();
@@ -77,6 +77,7 @@ void BaliseTracker::update(const EdgePosition& place, bool declared, bool heard)
     go_undeclared(foot);
   } else if (!go_declared(foot)) {
     acquire(foot);
+    if (before && !agree(reference_, *before)) ++taken_back_;
   } else if (front_turned_) {
     acquire_behind_turned_front(foot);
   }
@@ -318,6 +319,7 @@ std::optional<BaliseTracker::Step> BaliseTracker::step_on_edge(const EdgePositio
   if (edge.from_node == edge.to_node && over_its_end) return std::nullopt;  // a ring of one edge
   const double sign = sign_of(foot.direction);
   Step step{sign * (foot.offset_m - last_->offset_m)};
+  if (std::abs(step.way_m) > kLongestStepM) return std::nullopt;
   if (const auto groups = groups_on_.find(foot.edge); groups != groups_on_.end()) {
     for (const auto* group : groups->second) {
       step.groups.push_back(

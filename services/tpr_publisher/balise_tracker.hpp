@@ -44,7 +44,7 @@ class BaliseTracker {
   /// reference that was not passed but taken from the map is taken anew.
   void turn_front(bool is_at_other_end);
   [[nodiscard]] const std::optional<Reference>& reference() const { return reference_; }
-  /// So many times a group that had been taken for passed counted no more.
+  /// So many times a group that had been taken for passed counted no more, nor one of another track.
   [[nodiscard]] uint32_t taken_back() const { return taken_back_; }
   /// So many times the train went over its LRBG once more: round a ring, or back over it.
   [[nodiscard]] uint32_t passed_again() const { return passed_again_; }

@@ -18,6 +18,12 @@ constexpr double kShortestCycleM = 1.0;
 constexpr int64_t kClockJitterNs = 100'000'000;  // no clock that was set back
 constexpr double kMostCorrectedM = 200;  // a place; what is farther off is another passage of the group, round a loop
 
+// A clock that was set back by an hour does not silence the train for an hour.
+int64_t time_since(int64_t then_ns, int64_t now_ns) {
+  const int64_t since_ns = now_ns - then_ns;
+  return since_ns > -kClockJitterNs ? since_ns : std::numeric_limits<int64_t>::max();
+}
+
 }  // namespace
 
 ReportTrigger::ReportTrigger(const etcs::ReportParameters& parameters, double train_length_m)
@@ -97,12 +103,16 @@ double ReportTrigger::beyond_origin_m(const Moment& moment, bool rear_end) const
 }
 
 void ReportTrigger::note_events(const Moment& moment) {
+  const bool taken_back = moment.taken_back != taken_back_;
+  taken_back_ = moment.taken_back;
+  if (taken_back) group_passed_ = false;  // correction() tells which one counts instead
   if (moment.nid_lrbg != etcs::kUnknownBaliseGroup && moment.nid_lrbg != last_group_) {
     last_group_ = moment.nid_lrbg;
-    group_passed_ = true;
+    group_passed_ = !taken_back;
   }
   if (moment.passed_again > passed_again_) group_passed_ = true;
   passed_again_ = moment.passed_again;
+  count_way(moment);
   for (auto& location : locations_) {
     if (!origin_m_ || location.passed || beyond_origin_m(moment, location.rear_end) < location.at_m) continue;
     location.passed = true;
@@ -110,10 +120,16 @@ void ReportTrigger::note_events(const Moment& moment) {
   }
 }
 
-// A clock that was set back by an hour does not silence the train for an hour.
 int64_t ReportTrigger::since_report_ns(const Moment& moment) const {
-  const int64_t since_ns = moment.now_ns - reported_->now_ns;
-  return since_ns > -kClockJitterNs ? since_ns : std::numeric_limits<int64_t>::max();
+  return time_since(reported_->now_ns, moment.now_ns);
+}
+
+// A place that trembles is no way.
+void ReportTrigger::count_way(const Moment& moment) {
+  const double further_m = std::abs(moment.front_m - way_to_m_);
+  if (further_m < kShortestCycleM) return;
+  way_m_ += further_m;
+  way_to_m_ = moment.front_m;
 }
 
 bool ReportTrigger::cycle_distance_over(const Moment& moment) const {
@@ -122,7 +138,7 @@ bool ReportTrigger::cycle_distance_over(const Moment& moment) const {
   if (as_often_as_possible && since_report_ns(moment) < kShortestCycleNs) return false;
   const double period_m =
       as_often_as_possible ? kShortestCycleM : parameters_.d_cycloc * etcs::scale_m(parameters_.q_scale);
-  return way_lost_ || std::abs(moment.front_m - reported_->front_m) >= period_m;
+  return way_lost_ || way_m_ + std::abs(moment.front_m - way_to_m_) >= period_m;
 }
 
 bool ReportTrigger::cycle_time_over(const Moment& moment) const {
@@ -133,28 +149,44 @@ bool ReportTrigger::cycle_time_over(const Moment& moment) const {
 std::optional<Reason> ReportTrigger::onboard_reason(const Moment& moment) const {
   const auto& now = moment.onboard;
   const auto& then = reported_->onboard;
-  // Who counts from 0 again wants nothing yet.
-  const uint32_t wanted_before = now.reports_wanted < then.reports_wanted ? 0 : then.reports_wanted;
   if (moment.mode_changes != reported_->mode_changes) return Reason::mode;
   if (moment.level_changes != reported_->level_changes) return Reason::level;
   if (now.q_integrity == etcs::kIntegrityLost && then.q_integrity != etcs::kIntegrityLost)
     return Reason::integrity_lost;
   const bool confirmed = now.q_integrity != then.q_integrity || now.integrity_ns != then.integrity_ns;
   if (now.q_integrity == etcs::kConfirmedByDriver && confirmed) return Reason::integrity_confirmed;
-  if (now.reports_wanted != wanted_before) return now.wanted_because;
+  if (moment.wants != reported_->wants) return moment.wanted_because;
   return std::nullopt;
 }
 
-// What was said is not known any more: trackside must not go on with it until the cycle is over.
-bool ReportTrigger::group_lost(const Moment& moment) const {
-  if (reported_->nid_lrbg == etcs::kUnknownBaliseGroup || reported_->nid_lrbg == moment.nid_lrbg) return false;
-  return moment.nid_lrbg == etcs::kUnknownBaliseGroup || moment.taken_back != reported_->taken_back;
+// Trackside must not go on with what has proved wrong until the cycle is over.
+bool ReportTrigger::group_taken_back(const Moment& moment) const {
+  if (reported_->nid_lrbg == etcs::kUnknownBaliseGroup || moment.taken_back == reported_->taken_back) return false;
+  return reported_->nid_lrbg != moment.nid_lrbg || reported_->q_dirlrbg != moment.q_dirlrbg;
 }
 
-// One that comes and goes must not fill the store.
 bool ReportTrigger::group_found_again(const Moment& moment) const {
   return reported_->nid_lrbg == etcs::kUnknownBaliseGroup && moment.nid_lrbg != etcs::kUnknownBaliseGroup &&
          since_report_ns(moment) >= kShortestCycleNs;
+}
+
+bool ReportTrigger::motion_turned(const Moment& moment) const {
+  return moment.motion != Motion::unknown && moment.motion != reported_->motion;
+}
+
+// It must not fill the store.
+bool ReportTrigger::comes_and_goes(const Moment& moment) const {
+  return corrected_ns_ && time_since(*corrected_ns_, moment.now_ns) < kShortestCycleNs;
+}
+
+std::optional<Reason> ReportTrigger::correction(const Moment& moment) const {
+  const bool known = moment.nid_lrbg != etcs::kUnknownBaliseGroup;
+  if (!known && reported_->nid_lrbg != etcs::kUnknownBaliseGroup) return Reason::balise_group;
+  if (group_found_again(moment)) return Reason::balise_group;
+  if (comes_and_goes(moment)) return std::nullopt;
+  if (motion_turned(moment)) return Reason::moving;
+  if (group_taken_back(moment)) return Reason::balise_group;
+  return std::nullopt;
 }
 
 std::optional<Reason> ReportTrigger::due(const Moment& moment) {
@@ -165,8 +197,9 @@ std::optional<Reason> ReportTrigger::due(const Moment& moment) {
     return moment.standstill ? Reason::standstill : Reason::moving;
   }
   if (const auto reason = onboard_reason(moment)) return reason;
-  if (group_passed_ && parameters_.m_loc == etcs::kReportAtGroups) return Reason::balise_group;
-  if (group_lost(moment) || group_found_again(moment)) return Reason::balise_group;
+  if (const auto reason = correction(moment)) return reason;
+  if (group_passed_ && parameters_.m_loc == etcs::kReportAtGroups && !comes_and_goes(moment))
+    return Reason::balise_group;
   if (location_passed_) return Reason::location;
   if (cycle_distance_over(moment)) return Reason::cycle_distance;
   if (cycle_time_over(moment)) return Reason::cycle_time;
@@ -174,7 +207,10 @@ std::optional<Reason> ReportTrigger::due(const Moment& moment) {
 }
 
 void ReportTrigger::sent(const Moment& moment) {
+  if (reported_ && correction(moment)) corrected_ns_ = moment.now_ns;
   reported_ = moment;
+  way_m_ = 0;
+  way_to_m_ = moment.front_m;
   asked_ = false;
   group_passed_ = false;
   location_passed_ = false;

@@ -51,7 +51,9 @@ struct Moment {
   double max_safe_front_m = 0;  // infinite when not known: a location then counts as passed
   double min_safe_front_m = 0;
   bool standstill = false;
+  Motion motion = Motion::unknown;
   uint32_t nid_lrbg = etcs::kUnknownBaliseGroup;
+  uint32_t q_dirlrbg = etcs::kUnknownSide;
   uint32_t taken_back = 0;                // counts up whenever an LRBG that was told turns out to be none
   uint32_t passed_again = 0;              // counts up whenever the train goes over its LRBG once more
   std::optional<double> beyond_lrbg_m;    // front end beyond the LRBG, along the train
@@ -61,6 +63,8 @@ struct Moment {
   Onboard onboard;
   uint32_t mode_changes = 0;  // of what is reported: count up, so that one there and back is noticed
   uint32_t level_changes = 0;
+  uint32_t wants = 0;  // reports that the on-board unit has asked for
+  Reason wanted_because = Reason::session;
 };
 
 class ReportTrigger {
@@ -109,13 +113,17 @@ class ReportTrigger {
   };
   void place_locations(const Moment& moment);
   void wait_for_origin(const Moment& moment);
-  [[nodiscard]] bool group_lost(const Moment& moment) const;
+  [[nodiscard]] bool group_taken_back(const Moment& moment) const;
   [[nodiscard]] bool group_found_again(const Moment& moment) const;
+  [[nodiscard]] bool motion_turned(const Moment& moment) const;
+  [[nodiscard]] bool comes_and_goes(const Moment& moment) const;
+  [[nodiscard]] std::optional<Reason> correction(const Moment& moment) const;
   void note_events(const Moment& moment);
   /// By the max safe front end, or by the min safe rear end. REQUIRES: the origin's place is known.
   [[nodiscard]] double beyond_origin_m(const Moment& moment, bool rear_end) const;
   [[nodiscard]] std::optional<Reason> onboard_reason(const Moment& moment) const;
   [[nodiscard]] int64_t since_report_ns(const Moment& moment) const;
+  void count_way(const Moment& moment);
   [[nodiscard]] bool cycle_distance_over(const Moment& moment) const;
   [[nodiscard]] bool cycle_time_over(const Moment& moment) const;
 
@@ -128,8 +136,12 @@ class ReportTrigger {
   std::optional<double> waits_since_m_;  // for the origin; the front end's travelled distance
   bool passed_before_ = true;            // locations that lie behind when the origin is found were passed long ago
   std::optional<Moment> reported_;       // last moment that was sent
+  std::optional<int64_t> corrected_ns_;  // when one was sent last that took back what was said
+  double way_m_ = 0;                     // run since the last report, there and back, up to ...
+  double way_to_m_ = 0;                  // ... this front end
   uint32_t last_group_ = etcs::kUnknownBaliseGroup;
   uint32_t passed_again_ = 0;  // when it was looked at last
+  uint32_t taken_back_ = 0;    // the same
   bool asked_ = false;         // "now"
   bool group_passed_ = false;
   bool location_passed_ = false;

@@ -36,9 +36,12 @@ bool ToldParameters::is_known(std::span<const uint8_t> packet, std::optional<uin
 bool ToldParameters::hear(std::span<const uint8_t> packet, bool just_come, uint32_t lrbg, uint32_t count) {
   const bool said = lrbg != 0 && etcs::names_group(lrbg);
   auto origin = said ? std::optional(lrbg) : std::nullopt;
-  if (packet.empty()) return false;
-  const bool once_more = count_ > 0 && count > count_;
-  count_ = count;
+  if (packet.empty()) {
+    if (count == 0 || count < count_.value_or(0)) count_ = count;
+    return false;
+  }
+  const bool once_more = count_ && count > *count_;
+  count_ = count > 0 ? std::optional(count) : std::nullopt;
   if (is_known(packet, origin) && !once_more) return false;
   if (!said && !just_come) origin = etcs::kUnknownBaliseGroup;
   newer_ = {{packet.begin(), packet.end()}, origin};

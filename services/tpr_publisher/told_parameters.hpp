@@ -49,9 +49,9 @@ class ToldParameters {
 
   TprPublisher& publisher_;
   std::optional<Packet> used_;
-  std::optional<Packet> newer_;  // heard since, and refused ...
-  uint32_t count_ = 0;           // heard last
-  bool waits_ = false;           // ... but for the train's direction, which is not known
+  std::optional<Packet> newer_;    // heard since, and refused ...
+  std::optional<uint32_t> count_;  // heard last; nothing = not counted
+  bool waits_ = false;             // ... but for the train's direction, which is not known
   std::string refusal_;
 };
 

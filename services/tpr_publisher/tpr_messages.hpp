@@ -49,29 +49,37 @@ inline TrainPosition position_of(const track::Map* map, const msg::TrainState& s
   return position;
 }
 
-inline core::Result<Onboard> onboard_of(const msg::OnboardStatus& status) {
-  if (status.q_integrity() > 3)
-    return core::Error{"q_integrity is " + std::to_string(status.q_integrity()) + ", not 0 to 3."};
-  if (status.active_cab() > 2)
-    return core::Error{"active_cab is " + std::to_string(status.active_cab()) + ", not 0 to 2."};
-  if (status.packet_58_lrbg() > etcs::kUnknownBaliseGroup)
-    return core::Error{"packet_58_lrbg is " + std::to_string(status.packet_58_lrbg()) + ", not 0 to 16777215."};
-  if (status.reports_wanted() != 0 &&
-      (status.wanted_because() < msg::REPORT_BORDER || status.wanted_because() > msg::REPORT_ERROR))
-    return core::Error{"wanted_because is " + std::to_string(status.wanted_because()) +
-                       ", not border, session or error."};
+struct HeardOnboard {
   Onboard onboard;
+  std::string refusal;  // what of it is no value; empty = nothing
+};
+
+/// What is no value says nothing, and all the rest counts. A report that is wanted for no reason that we know is
+/// wanted.
+inline HeardOnboard onboard_of(const msg::OnboardStatus& status) {
+  HeardOnboard heard;
+  const auto value = [&](uint32_t said, const char* name, uint32_t least, uint32_t most, uint32_t otherwise) {
+    if (said >= least && said <= most) return said;
+    if (heard.refusal.empty())
+      heard.refusal = std::string(name) + " is " + std::to_string(said) + ", not " + std::to_string(least) + " to " +
+                      std::to_string(most) + ".";
+    return otherwise;
+  };
+  auto& onboard = heard.onboard;
   onboard.stamp_ns = status.stamp_ns();
   onboard.integrity_ns = status.integrity_ns();
   onboard.train_length_m = status.train_length_m();
   onboard.m_mode = status.m_mode();
   onboard.m_level = status.m_level();
   onboard.nid_ntc = status.nid_ntc();
-  onboard.q_integrity = status.q_integrity();
-  onboard.active_cab = static_cast<ActiveCab>(status.active_cab());
+  onboard.q_integrity = value(status.q_integrity(), "q_integrity", 0, 3, etcs::kNoIntegrityInformation);
+  onboard.active_cab = static_cast<ActiveCab>(value(status.active_cab(), "active_cab", 0, 2, 0));
+  value(status.packet_58_lrbg(), "packet_58_lrbg", 0, etcs::kUnknownBaliseGroup, 0);
   onboard.reports_wanted = status.reports_wanted();
-  onboard.wanted_because = static_cast<Reason>(status.wanted_because());
-  return onboard;
+  if (onboard.reports_wanted != 0)
+    onboard.wanted_because = static_cast<Reason>(
+        value(status.wanted_because(), "wanted_because", msg::REPORT_BORDER, msg::REPORT_ERROR, msg::REPORT_SESSION));
+  return heard;
 }
 
 /// The values of the message, as it says them.

@@ -15,13 +15,12 @@ namespace {
 
 constexpr int64_t kOldestNs = core::kNsPerSecond;
 constexpr int64_t kOtherTimeNs = 3600 * core::kNsPerSecond;
-constexpr int64_t kOnboardSilentNs = 3 * core::kNsPerSecond;
 // Of a train that comes to rest the estimated speed may have any sign: its direction is that of its way.
 constexpr double kSurelyMovesMps = 1.0;
 constexpr int64_t kTrainborneStepNs = 10'000'000;  // T_TRAIN
-constexpr double kNoCorrectionM = 2.0;
-constexpr double kMovesM = 0.05;     // what fusion takes for rest
-constexpr double kCreepsM = 0.045;   // at most while it rests
+constexpr double kRollsM = 2.0;                    // the other way without a rest that was seen
+constexpr double kMovesM = 0.04;     // by 5 cm fusion ends a rest: it is known by then which way they were
+constexpr double kForgetsS = 5;      // at rest: an error of the speed adds up to no way
 constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
 
 /// Empty when the position is young enough.
@@ -79,11 +78,12 @@ void TprPublisher::follow(const TrainPosition& position) {
   if (!heard) {
     integrity_.lose_way();
     trigger_.lose_way();
-    furthest_m_.reset();
   }
   const auto position_before = std::exchange(position_, position);
   const auto* group_before = reference_ ? reference_->group : nullptr;
-  follow_motion(position, position_before);
+  const bool followed = heard && position_before;
+  follow_motion(position,
+                followed ? std::optional(core::seconds(position.stamp_ns - position_before->stamp_ns)) : std::nullopt);
   if (tracker_) {
     if (position.place_known()) {
       tracker_->update(position.foot, position.track_declared(), heard);
@@ -100,39 +100,34 @@ void TprPublisher::follow(const TrainPosition& position) {
   if (backs && settings_.report.baseline == etcs::Baseline::b4) integrity_.use_up();
   if (position.usable) {
     auto place = place_of_now();
-    if (heard && position_before) place.moved_m = moved_m(*position_before);
+    if (followed) place.moved_m = moved_m(*position_before);
     integrity_.follow(place);
   } else {
     integrity_.lose_way();
   }
 }
 
-void TprPublisher::follow_motion(const TrainPosition& position, const std::optional<TrainPosition>& before) {
-  if (!furthest_m_ || std::isnan(position.speed_mps)) {
+// By the speed, because what the distance is corrected by is no way.
+void TprPublisher::follow_motion(const TrainPosition& position, std::optional<double> since_s) {
+  if (!since_s || std::isnan(position.speed_mps)) {
     motion_ = Motion::unknown;
-    furthest_m_ = position.distance_m;
+    way_m_ = 0;
+  } else {
+    if (position.standstill) way_m_ -= way_m_ * *since_s / kForgetsS;
+    way_m_ += position.speed_mps * *since_s;
   }
   rested_ = rested_ || position.standstill;
-  if (position.standstill && motion_ != Motion::unknown) {
-    // What the distance is corrected by at rest is no way: what the speed does not explain, and more than it may creep.
-    if (before && before->standstill) {
-      const double crept_m = position.speed_mps * core::seconds(position.stamp_ns - before->stamp_ns);
-      *furthest_m_ += position.distance_m - before->distance_m - crept_m;
-      furthest_m_ = std::clamp(*furthest_m_, position.distance_m - kCreepsM, position.distance_m + kCreepsM);
-    }
-    return;
-  }
-  const double moved_m = position.distance_m - *furthest_m_;
-  const bool fast = !position.standstill && std::abs(position.speed_mps) >= kSurelyMovesMps;
-  const Motion moves = (fast ? position.speed_mps : moved_m) > 0 ? Motion::forward : Motion::backward;
-  const bool agree = std::abs(moved_m) >= kMovesM && (moved_m > 0) == (position.speed_mps > 0);
+  if (position.standstill) return;
+  const bool fast = std::abs(position.speed_mps) >= kSurelyMovesMps;
+  const Motion moves = (fast ? position.speed_mps : way_m_) > 0 ? Motion::forward : Motion::backward;
+  const bool agree = std::abs(way_m_) >= kMovesM && way_m_ * position.speed_mps > 0;
   // No train turns round without coming to rest; an estimate that is corrected while it brakes does.
   // Nor may a rest have been seen where it rolls back at once.
-  const bool turns = agree && (rested_ || motion_ == Motion::unknown || std::abs(moved_m) >= kNoCorrectionM);
+  const bool turns = agree && (rested_ || motion_ == Motion::unknown || std::abs(way_m_) >= kRollsM);
   if (moves != motion_ && !fast && !turns) return;
   rested_ = rested_ && !fast && !agree;
   motion_ = moves;
-  furthest_m_ = position.distance_m;
+  way_m_ = 0;
 }
 
 TrainPosition TprPublisher::doubted_position() const {
@@ -198,70 +193,6 @@ core::Status TprPublisher::set_parameters(const etcs::ReportParameters& paramete
   return {};
 }
 
-core::Status TprPublisher::set_onboard(const Onboard& onboard, int64_t now_ns) {
-  ReportSettings report = settings_.report;
-  report.m_mode = onboard.m_mode;
-  report.m_level = onboard.m_level;
-  report.nid_ntc = onboard.nid_ntc;
-  report.train_data = onboard.train_length_m > 0;
-  const auto trial = etcs::encode(make_report({}, std::nullopt, Motion::unknown, report, 0), report.baseline);
-  if (!trial.ok()) return trial.error();
-  mode_changes_ += report.m_mode != settings_.report.m_mode ? 1 : 0;
-  const bool other_ntc = report.m_level == etcs::kLevelNtc && report.nid_ntc != settings_.report.nid_ntc;
-  level_changes_ += report.m_level != settings_.report.m_level || other_ntc ? 1 : 0;
-  settings_.report = report;
-  length_said_ = length_said_ || report.train_data;
-  if (length_said_) trigger_.set_train_length(onboard.train_length_m);
-  hear_cab(onboard.active_cab);
-  hear_integrity(onboard, now_ns);
-  return {};
-}
-
-// While the driver walks to the other end nobody says anything: then the front stays where it was.
-void TprPublisher::hear_cab(ActiveCab cab) {
-  if (cab == ActiveCab::not_said) return;
-  const auto was = std::exchange(cab_, cab);
-  if (cab == was) return;
-  if (tracker_) {
-    tracker_->turn_front(is_turned());
-    reference_ = tracker_->reference();
-  }
-  if (was == ActiveCab::not_said && !is_turned()) return;  // as it was taken for
-  integrity_.lose_way();
-  const bool front_was_known = was != ActiveCab::not_said || ends_.to_front_m(was);
-  if (front_was_known) {
-    trigger_.turn();
-  } else {  // what was asked for stands: a process that began anew hears which cab it is
-    trigger_.lose_way();
-  }
-}
-
-void TprPublisher::hear_integrity(const Onboard& onboard, int64_t now_ns) {
-  const bool again = onboard_ && onboard.integrity_ns == onboard_->integrity_ns;
-  onboard_ = onboard;
-  onboard_->stamp_ns = std::min(onboard.stamp_ns, now_ns);
-  // What has come was said before now: what is later is the other clock's error.
-  onboard_ahead_ns_ = onboard.stamp_ns - onboard_->stamp_ns;
-  if (!again) {
-    complete_ns_ = std::min(onboard.integrity_ns, onboard.stamp_ns) - onboard_ahead_ns_;
-    complete_ahead_ns_ = std::max(onboard.integrity_ns - now_ns, onboard_ahead_ns_);
-  }
-  if (is_confirmed(onboard.q_integrity)) {
-    onboard_ahead_ns_ = std::max(onboard_ahead_ns_, complete_ahead_ns_);
-    if (onboard_ahead_ns_ > kMostAheadNs) onboard_->q_integrity = etcs::kNoIntegrityInformation;
-  }
-  integrity_.hear(onboard_->q_integrity, complete_ns_, onboard.train_length_m);
-}
-
-// One that is ahead of its time is as little to be believed as one that says nothing.
-bool TprPublisher::onboard_silent(int64_t now_ns) const {
-  return onboard_ && std::abs(now_ns - onboard_->stamp_ns) > kOnboardSilentNs;
-}
-
-bool TprPublisher::onboard_overtaken(int64_t stamp_ns, int64_t now_ns) const {
-  return onboard_ && stamp_ns < onboard_->stamp_ns && !onboard_silent(now_ns);
-}
-
 etcs::TrainPositionReport TprPublisher::fields(int64_t now_ns) const {
   const auto position = doubted_position();
   auto settings = settings_.report;
@@ -295,6 +226,7 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   const auto position = doubted_position();
   const double to_front_m = ends_.to_front_m(cab_).value_or(0);
   moment.standstill = position.standstill;
+  moment.motion = motion();
   moment.foot_to_front_m = to_front_m;
   moment.front_m = position.distance_m + to_front_m;
   moment.max_safe_front_m =
@@ -304,6 +236,7 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   moment.passed_again = tracker_ ? tracker_->passed_again() : 0;
   if (const auto here = reference()) {
     moment.nid_lrbg = here->group->nid_lrbg();
+    moment.q_dirlrbg = orientation(*here);
     const auto there = trigger_origin(position.distance_m);
     if (there) {
       moment.beyond_origin_m = there->foot_m + to_front_m;
@@ -320,6 +253,8 @@ Moment TprPublisher::moment(int64_t now_ns) const {
   }
   moment.mode_changes = mode_changes_;
   moment.level_changes = level_changes_;
+  moment.wants = wants_;
+  moment.wanted_because = wanted_because_;
   return moment;
 }
 
@@ -350,14 +285,25 @@ Outcome TprPublisher::update(const TrainPosition& position, int64_t now_ns) {
 }
 
 // A clock that was set back is taken on from where it was.
+// A position may be ahead of this clock.
 int64_t TprPublisher::trainborne_ns(int64_t now_ns) const {
-  return std::max(now_ns + trainborne_ahead_ns_, sent_trainborne_ns_ + kTrainborneStepNs);
+  return std::max(std::max(now_ns, position_->stamp_ns) + trainborne_ahead_ns_,
+                  sent_trainborne_ns_ + kTrainborneStepNs);
+}
+
+void TprPublisher::hear_trainborne(uint32_t t_train_heard, int64_t now_ns) {
+  if (t_train_heard >= etcs::kUnknownTime) return;
+  int64_t ahead = int64_t{t_train_heard} - t_train(now_ns);
+  constexpr int64_t kPeriod = etcs::kUnknownTime;  // it starts anew
+  if (ahead > kPeriod / 2) ahead -= kPeriod;
+  if (ahead < -kPeriod / 2) ahead += kPeriod;
+  sent_trainborne_ns_ = std::max(sent_trainborne_ns_, now_ns + ahead * kTrainborneStepNs);
 }
 
 void TprPublisher::sent(const Report& report, const Moment& moment) {
   trigger_.sent(moment);
   sent_trainborne_ns_ = trainborne_ns(report.sent_ns);
-  trainborne_ahead_ns_ = sent_trainborne_ns_ - report.sent_ns;
+  trainborne_ahead_ns_ = sent_trainborne_ns_ - std::max(report.sent_ns, report.stamp_ns);
   if (settings_.report.baseline == etcs::Baseline::b4 && is_confirmed(report.fields.q_length)) integrity_.use_up();
 }
 

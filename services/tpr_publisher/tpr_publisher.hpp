@@ -46,6 +46,8 @@ class TprPublisher {
   /// A report must be younger than 1 s when it is sent (SUBSET-041 5.3.1.3): an older position gives a refusal and the
   /// report stays due.
   Outcome update(const TrainPosition& position, int64_t now_ns);
+  /// T_TRAIN of a report of another tpr_publisher: reports of this one are later.
+  void hear_trainborne(uint32_t t_train, int64_t now_ns);
   /// Another tpr_publisher reports: follows the train, and begins with a report of its own when update() is called
   /// next.
   void watch(const TrainPosition& position, int64_t now_ns);
@@ -63,15 +65,18 @@ class TprPublisher {
   [[nodiscard]] std::optional<uint32_t> origin() const { return trigger_.origin(); }
   /// It has locations, and they are over: the cab was changed since, or their group is not on the train's way.
   [[nodiscard]] bool locations_given_up() const { return trigger_.locations_given_up(); }
-  /// What the on-board unit says replaces mode and level of the settings. Refused when it cannot be encoded. Of one
-  /// whose clock is more than a second ahead no confirmation of the train's integrity is taken, also not afterwards:
-  /// its time would be taken for the place of a later one.
+  /// What the on-board unit says replaces mode and level of the settings. A mode or level that cannot be encoded leaves
+  /// the one before and is the error; all the rest counts. Of one whose clock is more than a second ahead no
+  /// confirmation of the train's integrity is taken, also not afterwards: its time would be taken for the place of a
+  /// later one.
   core::Status set_onboard(const Onboard& onboard, int64_t now_ns);
   /// A newer one was heard lately: this is what another writer has left behind.
   [[nodiscard]] bool onboard_overtaken(int64_t stamp_ns, int64_t now_ns) const;
   /// The on-board unit was heard once, but not lately: its mode and level stand, train integrity is not known.
   [[nodiscard]] bool onboard_silent(int64_t now_ns) const;
   [[nodiscard]] bool onboard_heard(int64_t now_ns) const { return onboard_ && !onboard_silent(now_ns); }
+  /// It was never heard: mode and level are those of the settings.
+  [[nodiscard]] bool mode_assumed() const { return !onboard_; }
   /// What the reports leave out of what the on-board unit says, and why; empty = nothing.
   [[nodiscard]] std::string left_out(int64_t now_ns) const;
   /// Nobody knows where the train's front is, and why; empty = it is known.
@@ -83,7 +88,8 @@ class TprPublisher {
   static constexpr int64_t kMostAheadNs = core::kNsPerSecond;  // the on-board unit's clock
 
   void follow(const TrainPosition& position);
-  void follow_motion(const TrainPosition& position, const std::optional<TrainPosition>& before);
+  /// `since_s`: since the state before; nothing = its way was not followed.
+  void follow_motion(const TrainPosition& position, std::optional<double> since_s);
   void hear_cab(ActiveCab cab);
   [[nodiscard]] bool is_turned() const { return cab_ == ActiveCab::other; }
   /// With the doubt of an undeclared track; along the train's own axis, as the ones below.
@@ -103,6 +109,8 @@ class TprPublisher {
   [[nodiscard]] TrainIntegrity::Place place_of_now() const;
   /// By how much the place was corrected against the travelled distance; infinite = nobody knows.
   [[nodiscard]] double moved_m(const TrainPosition& before) const;
+  core::Status hear_mode_and_level(const Onboard& onboard);
+  void hear_wants(const Onboard& onboard);
   void hear_integrity(const Onboard& onboard, int64_t now_ns);
   [[nodiscard]] Moment moment(int64_t now_ns) const;
   [[nodiscard]] etcs::TrainPositionReport fields(int64_t now_ns) const;
@@ -121,6 +129,8 @@ class TprPublisher {
   int64_t onboard_ahead_ns_ = 0;    // too much of it, and no confirmation is taken
   uint32_t mode_changes_ = 0;
   uint32_t level_changes_ = 0;
+  uint32_t wants_ = 0;
+  Reason wanted_because_ = Reason::session;
   int64_t trainborne_ahead_ns_ = 0;  // T_TRAIN's clock is ahead of the caller's, which was set back
   int64_t sent_trainborne_ns_ = 0;
   TrainEnds ends_;
@@ -128,9 +138,9 @@ class TprPublisher {
   // Along the axis that the camera looks.
   std::optional<Reference> reference_;
   std::optional<TrainPosition> position_;
-  Motion motion_ = Motion::unknown;   // the last one; kept at standstill
-  std::optional<double> furthest_m_;  // travelled distance that it has come to
-  bool rested_ = false;               // since it last moved for sure
+  Motion motion_ = Motion::unknown;  // the last one; kept at standstill
+  double way_m_ = 0;                 // by its speed, since it last moved so
+  bool rested_ = false;              // since it last moved for sure
 };
 
 }  // namespace railfix::tpr_publisher

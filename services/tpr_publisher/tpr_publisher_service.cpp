@@ -11,6 +11,7 @@ namespace railfix::tpr_publisher {
 namespace {
 
 constexpr std::chrono::milliseconds kTickPeriod{500};
+constexpr int kTicksUnheard = 10;  // of onboard_status, which comes once a second
 constexpr int64_t kGapNs = 500'000'000;
 constexpr int64_t kListenNs = 150'000'000;  // others in charge say so forty times a second
 
@@ -78,10 +79,16 @@ void TprPublisherService::note_packet_58(bool taken) {
 void TprPublisherService::share_charge() {
   if (context_.common().ownership_strength == 0) return;
   context_.share_charge({[this] { return fitness(); }, {}});
-  // Numbers go on where the other one stopped.
-  context_.on<msg::TrainPositionReport>(
-      messaging::topics::train_position_report,
-      [this](const msg::TrainPositionReport& report) { seq_ = std::max(seq_, report.seq() + 1); });
+  context_.on<msg::TrainPositionReport>(messaging::topics::train_position_report,
+                                        [this](const msg::TrainPositionReport& report) { hear_other(report); });
+}
+
+// Numbers and T_TRAIN go on where the other one stopped, whatever its clock said.
+void TprPublisherService::hear_other(const msg::TrainPositionReport& report) {
+  seq_ = std::max(seq_, report.seq() + 1);
+  const size_t bytes = std::min<size_t>(report.message_bytes(), report.message().size());
+  const auto fields = etcs::decode({report.message().data(), bytes}, static_cast<etcs::Baseline>(report.baseline()));
+  if (fields.ok()) publisher_.hear_trainborne(fields.value().t_train, now_ns(report.sent_ns()));
 }
 
 // Without a way to the ground reports only wait; without a store a power cut loses some; with a wrong clock they would
@@ -162,20 +169,32 @@ void TprPublisherService::on_onboard(const msg::OnboardStatus& status) {
   const int64_t now = now_ns(status.stamp_ns());
   if (publisher_.onboard_overtaken(status.stamp_ns(), now)) return;
   const bool heard_before = publisher_.onboard_heard(now);
-  const auto onboard = onboard_of(status);
-  const auto taken = onboard.ok() ? publisher_.set_onboard(onboard.value(), now) : core::Status(onboard.error());
-  onboard_refusal_ = taken.ok() ? "" : "onboard_status is not used: " + taken.error().message;
+  const auto heard = onboard_of(status);
+  const auto taken = publisher_.set_onboard(heard.onboard, now);
+  const auto refusal = taken.ok() ? heard.refusal : taken.error().message;
+  onboard_refusal_ = refusal.empty() ? "" : "Not all of onboard_status is used: " + refusal;
   hear_packet_58(status, heard_before);
 }
 
 void TprPublisherService::on_tick() {
   if (!state_seen_ || !context_.in_charge()) return;  // ready, whatever the ground link says
+  say_what_is_assumed();
   // The end of played data is no fault.
   if (!context_.common().lock_step && !(data_time_ && data_time_->stands())) {
     auto outcome = publisher_.tick(now_ns(0));
     if (!outcome.refusal.empty()) report_trouble_ = std::move(outcome.refusal);
   }
   show();
+}
+
+// No trouble of its own, because a train without that connection has it for good; but nobody shall take it for known.
+void TprPublisherService::say_what_is_assumed() {
+  if (ticks_unheard_ > kTicksUnheard || ++ticks_unheard_ <= kTicksUnheard) return;
+  if (publisher_.mode_assumed())
+    context_.log().warn(
+        "Mode {} and level {} of the reports are those of the keys m_mode and m_level: nobody has sent "
+        "onboard_status. Train integrity is not known.",
+        settings_.report.m_mode, settings_.report.m_level);
 }
 
 void TprPublisherService::send(const Report& report, int64_t grabbed_ns) {

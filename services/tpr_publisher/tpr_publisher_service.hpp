@@ -29,6 +29,8 @@ class TprPublisherService {
   /// For a later process. `taken`: one is used from now on.
   void note_packet_58(bool taken);
   void share_charge();
+  void hear_other(const msg::TrainPositionReport& report);
+  void say_what_is_assumed();
   [[nodiscard]] int fitness() const;
   /// Not in charge: works along and sends nothing.
   void stand_by(const msg::TrainState& state, int64_t now_ns);
@@ -52,6 +54,7 @@ class TprPublisherService {
   int64_t state_monotonic_ns_ = 0;  // when the last one came
   int64_t listens_until_ns_ = 0;    // sends nothing before
   bool reference_known_ = false;    // in the last report
+  int ticks_unheard_ = 0;           // until it was looked whether onboard_status has come
   uint64_t seq_ = 0;
   std::unique_ptr<GroundLink> ground_link_;  // nullptr = no broker
   std::string report_trouble_;

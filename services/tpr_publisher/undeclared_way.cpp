@@ -61,6 +61,12 @@ std::optional<std::vector<WayBetween>> ways_between(const track::Map& map, const
   return found;
 }
 
+double most_apart_m(const std::vector<WayBetween>& ways, double length_m) {
+  double apart_m = 0;
+  for (const auto& way : ways) apart_m = std::max(apart_m, std::abs(way.length_m - length_m));
+  return apart_m;
+}
+
 bool every_way_leads_to(const track::Map& map, const track::Ways& ways, const track::EdgePosition& from, bool along,
                         uint32_t edge, double most_m) {
   struct Open {

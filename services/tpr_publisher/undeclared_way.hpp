@@ -36,6 +36,9 @@ std::optional<std::vector<WayBetween>> ways_between(const track::Map& map, const
                                                     const track::EdgePosition& from, const track::EdgePosition& to,
                                                     double way_m);
 
+/// The train may have come by any of the ways: their lengths differ by so much from this one at most.
+double most_apart_m(const std::vector<WayBetween>& ways, double length_m);
+
 /// Whether a train that runs on from a place, along its direction or against it, comes to that edge within `most_m`
 /// whichever way it takes. False when there are too many to look at. REQUIRES: the edge is on the map.
 bool every_way_leads_to(const track::Map& map, const track::Ways& ways, const track::EdgePosition& from, bool along,

@@ -10,6 +10,7 @@
 #include "compare/columns.hpp"
 #include "compare/doubts.hpp"
 #include "compare/one_train.hpp"
+#include "compare/other_fields.hpp"
 #include "compare/pairing.hpp"
 #include "compare/time_shift.hpp"
 #include "compare/verdict_text.hpp"
@@ -43,6 +44,7 @@ struct CompareOptions {
 constexpr int kWorse = 3;  // exit code
 constexpr double kPathM = 1e6;
 constexpr double kTurnS = 0.1;
+constexpr size_t kMostTold = 5;
 constexpr const char* kSeconds = "a number of seconds";
 constexpr double kLongestGapS = 86400;
 constexpr double kLargestOffsetS = 4e9;  // from a clock that begins at 0 to UTC, twice; sums fit nanoseconds
@@ -112,8 +114,34 @@ void print_shift(const compare::Pairing& pairing, const std::optional<compare::J
               to_truth.shift_s, to_truth.sigma_s, to_truth.shift_s >= 0 ? "late" : "early");
 }
 
+void print_speeds(const std::vector<compare::Pair>& pairs) {
+  std::vector<double> sizes;
+  double mean_kmh = 0;
+  size_t apart = 0;
+  for (const auto& pair : pairs) {
+    sizes.push_back(std::abs(pair.faster_kmh));
+    mean_kmh += pair.faster_kmh / static_cast<double>(pairs.size());
+    if (pair.speeds_apart() && ++apart <= kMostTold) {
+      std::printf("  at %.3f s the speeds differ by %.0f km/h (V_TRAIN), more than both may be off\n",
+                  core::seconds(pair.stamp_ns), pair.speed_apart_kmh);
+    }
+  }
+  const auto size = evaluation::summarise(sizes);
+  std::printf("speed, ours - certified  mean %+.1f km/h, |.| p50 %.1f, p95 %.1f, max %.1f km/h\n", mean_kmh, size.p50,
+              size.p95, size.max);
+  if (apart > 0) std::printf("speeds apart             in %zu of %zu\n", apart, pairs.size());
+}
+
+void print_other_fields(const std::vector<compare::Pair>& pairs) {
+  const auto other = compare::other_fields_of(pairs);
+  std::printf("not the same             M_MODE %zu, M_LEVEL %zu, Q_LENGTH %zu of %zu; not judged\n", other.modes,
+              other.levels, other.integrity, pairs.size());
+  if (other.both_lengths == 0) return;
+  std::printf("L_TRAININT               ours %+.1f m on average, in %zu of %zu; not judged\n", other.longer_m,
+              other.both_lengths, pairs.size());
+}
+
 void print_pairs(const compare::Pairing& pairing, const std::optional<compare::Judge>& judge) {
-  constexpr size_t kMostTold = 5;
   std::vector<double> differences;
   double carried_m = 0;
   size_t disjoint = 0;
@@ -149,6 +177,8 @@ void print_pairs(const compare::Pairing& pairing, const std::optional<compare::J
   std::printf("intervals overlap        %zu of %zu\n", pairing.pairs.size() - disjoint, pairing.pairs.size());
   if (turned > 0) std::printf("train turned round       in %zu of %zu\n", turned, pairing.pairs.size());
   if (runs_apart > 0) std::printf("train runs the other way in %zu of %zu\n", runs_apart, pairing.pairs.size());
+  print_speeds(pairing.pairs);
+  print_other_fields(pairing.pairs);
 }
 
 /// Reports that come now, until the other side's file is over, time is up, or Ctrl-C; each pair is told as it comes.

@@ -235,6 +235,26 @@ TEST_F(TprCompareFiles, WhatContradictsOrComesTwiceIsTold) {
   EXPECT_THAT(outcome.err, HasSubstr(file("certified.csv") + ": none of its 20 reports has a place"));
 }
 
+TEST_F(TprCompareFiles, ASpeedThatIsOffAndAnotherModeAreTold) {
+  const auto write = [&](const char* name, uint32_t v_train, uint32_t m_mode) {
+    std::ofstream out(file(name));
+    out << "stamp_ns,hex\n";
+    for (int i = 0; i < 20; ++i) {
+      auto report = beyond(tpr_publisher::testing::kA, 400 + 20 * i, 10);
+      report.v_train = v_train;
+      report.m_mode = m_mode;
+      out << i * core::kNsPerSecond << ',' << hex_of(report) << '\n';
+    }
+  };
+  write("ours.csv", 18, 0);
+  write("certified.csv", 14, 2);
+  const auto outcome = compare({});
+  EXPECT_THAT(outcome.out, HasSubstr("speed, ours - certified  mean +20.0 km/h, |.| p50 20.0"));
+  EXPECT_THAT(outcome.out, HasSubstr("speeds apart             in 20 of 20"));
+  EXPECT_THAT(outcome.out, HasSubstr("not shown: on 1 legs the speeds differ by more than both may be off (V_TRAIN)"));
+  EXPECT_THAT(outcome.out, HasSubstr("M_MODE 20, M_LEVEL 0, Q_LENGTH 0 of 20; not judged"));
+}
+
 TEST_F(TprCompareFiles, ASideWithoutReportsIsNamed) {
   const auto refusal = [&](const std::vector<std::string>& more) {
     const auto outcome = compare(more);

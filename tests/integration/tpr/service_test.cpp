@@ -1,6 +1,8 @@
 // The service program itself, over DDS: states in, reports and status out.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "etcs/report_parameters.hpp"
 #include "integration/tpr/tpr_service.hpp"
 #include "messaging/onboard_topic.hpp"
@@ -138,6 +140,56 @@ class StandardInput {
   int ends_[2] = {-1, -1};
   int kept_ = -1;
 };
+
+TEST_F(TprService, AValueOfTheOnboardUnitThatIsNoneTakesNothingAlong) {
+  messaging::Writer<msg::OnboardStatus> onboard(participant_, topics::onboard_status);
+  test::Program program(service());
+  ASSERT_TRUE(run_until([&] { return connected() && onboard.matched_readers() > 0; }, [] {}));
+  ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450); }));
+  msg::OnboardStatus status;
+  status.stamp_ns(core::wall_ns());
+  status.m_mode(2);
+  status.m_level(etcs::kLevel2);
+  status.q_integrity(etcs::kIntegrityLost);
+  status.active_cab(7);
+  status.reports_wanted(1);  // for no reason that there is
+  onboard.write(status);
+  ASSERT_TRUE(run_until([&] { return reports_.size() == 2 && !reason().empty(); }, [&] { write_state(450); }));
+  EXPECT_THAT(reason(), ::testing::HasSubstr("Not all of onboard_status is used: active_cab is 7, not 0 to 2."));
+  const auto& report = reports_.back();
+  const auto said = etcs::decode({report.message().data(), report.message_bytes()}, etcs::Baseline::b3).value();
+  EXPECT_EQ(said.m_mode, 2U);
+  EXPECT_EQ(said.q_length, uint32_t{etcs::kIntegrityLost});
+}
+
+TEST_F(TprService, ThatModeAndLevelAreAssumedStandsInTheLog) {
+  const auto log = std::filesystem::temp_directory_path() / (train_ + ".log");
+  test::Program program(service({"common.log_level=warning"}), {{}, log, {}});
+  ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+  const auto said = [&] { return test::slurp(log).find("nobody has sent onboard_status") != std::string::npos; };
+  EXPECT_TRUE(run_until(said, [&] { write_state(450); })) << test::slurp(log);
+  std::filesystem::remove(log);
+}
+
+// The clock of the other host is 5 s ahead, as its reports say.
+TEST_F(TprService, TrainborneTimeGoesOnWhereTheOtherOneReported) {
+  messaging::Writer<msg::TrainPositionReport> other(participant_, topics::train_position_report);
+  test::Program program(service({"common.ownership_strength=1", "tpr_publisher.t_cycloc_s=1"}));
+  ASSERT_TRUE(run_until([&] { return connected() && other.matched_readers() > 1; }, [] {}));
+  const auto t_train = [](const msg::TrainPositionReport& report) {
+    return etcs::decode({report.message().data(), report.message_bytes()}, etcs::Baseline::b3).value().t_train;
+  };
+  ASSERT_TRUE(run_until([&] { return !reports_.empty(); }, [&] { write_state(450); }));
+  auto ahead = reports_.back();
+  auto fields = etcs::decode({ahead.message().data(), ahead.message_bytes()}, etcs::Baseline::b3).value();
+  fields.t_train += 500;
+  const auto bytes = etcs::encode(fields, etcs::Baseline::b3).value();
+  std::ranges::copy(bytes, ahead.message().begin());
+  ahead.seq(ahead.seq() + 100);
+  other.write(ahead);
+  ASSERT_TRUE(run_until([&] { return reports_.back().seq() > ahead.seq(); }, [&] { write_state(450); }));
+  EXPECT_GT(t_train(reports_.back()), fields.t_train);
+}
 
 // `railfix tpr onboard` in place of the on-board unit: the command line, then lines on its standard input.
 TEST_F(TprService, HearsTheOnboardCommand) {

@@ -105,6 +105,71 @@ TEST(Doubts, TheTruthSaysWhoseStampsAreOff) {
   EXPECT_NEAR(doubts(0.5, 0.5).stamps->offset_s, -0.5, 0.01);
 }
 
+/// Legs of ten reports each, behind groups in turns; `change` makes ours of the nth report of a leg.
+template <class Change>
+Doubts doubts_where(size_t legs, Change change) {
+  std::vector<TimedReport> ours;
+  std::vector<TimedReport> certified;
+  for (size_t leg = 0; leg < legs; ++leg) {
+    for (size_t n = 0; n < 10; ++n) {
+      const auto one = report(static_cast<double>(10 * leg + n), leg % 2 == 0 ? kA : kB, 20.0 * static_cast<double>(n));
+      certified.push_back(one);
+      ours.push_back(one);
+      change(leg, n, ours.back().fields);
+    }
+  }
+  return doubts_of(pair_up(ours, certified, Axes(), kGapNs), std::nullopt, 0);
+}
+
+TEST(Doubts, ATrainThatIsTurnedRoundInSomeReportsOfALegIsOne) {
+  const auto turned = [](size_t legs, size_t of_leg, size_t every) {
+    return doubts_where(legs,
+                        [&](size_t leg, size_t n, etcs::TrainPositionReport& fields) {
+                          if (leg % every == 0 && n >= 4 && n < 4 + of_leg) fields.q_dirlrbg = etcs::kReverse;
+                        })
+        .turned;
+  };
+  EXPECT_EQ(turned(40, 4, 1), 40U);
+  EXPECT_EQ(turned(40, 2, 40), 1U) << "two of one leg";
+  EXPECT_EQ(turned(40, 1, 1), 40U) << "one of ten";
+  EXPECT_EQ(turned(40, 1, 40), 0U) << "one of 400 proves nothing";
+  EXPECT_EQ(turned(40, 0, 1), 0U);
+}
+
+TEST(Doubts, ATrainThatRunsTheOtherWayInSomeReportsOfALegIsOne) {
+  const auto doubts = doubts_where(40, [](size_t, size_t n, etcs::TrainPositionReport& fields) {
+    if (n < 4) fields.q_dirtrain = etcs::kReverse;
+  });
+  EXPECT_EQ(doubts.runs_apart, 40U);
+}
+
+// Ours say it one report late.
+TEST(Doubts, AChangeOfTheCabMayBeSaidOneReportApart) {
+  std::vector<TimedReport> ours;
+  std::vector<TimedReport> certified;
+  for (int i = 0; i < 20; ++i) {
+    ours.push_back(report(i, kA, 50, 0, i <= 10));
+    certified.push_back(report(i, kA, 50, 0, i < 10));
+  }
+  EXPECT_EQ(doubts_of(pair_up(ours, certified, Axes(), kGapNs), std::nullopt, 0).turned, 0U);
+  ours[11] = ours[12] = ours[10];
+  ours[11].stamp_ns = certified[11].stamp_ns;
+  ours[12].stamp_ns = certified[12].stamp_ns;
+  EXPECT_EQ(doubts_of(pair_up(ours, certified, Axes(), kGapNs), std::nullopt, 0).turned, 1U);
+}
+
+TEST(Doubts, ASpeedThatIsFartherOffThanBothMayBeIsOne) {
+  const auto apart = [](uint32_t steps) {
+    return doubts_where(40,
+                        [&](size_t, size_t n, etcs::TrainPositionReport& fields) {
+                          if (n < 4) fields.v_train += steps;
+                        })
+        .speeds_apart;
+  };
+  EXPECT_EQ(apart(2), 0U) << "rounded, and each 3 km/h off";
+  EXPECT_EQ(apart(4), 40U);
+}
+
 TEST(Doubts, OursMayReportMoreOftenButNotMoreSeldom) {
   const auto seldom = [](double ours_s, double certified_s) {
     Doubts doubts;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "compare/other_fields.hpp"
 #include "core/time.hpp"
 #include "unit/compare/made_up_reports.hpp"
 
@@ -230,6 +231,40 @@ TEST(Pairing, HowOftenASideReportsIsWhatAMomentSees) {
   EXPECT_NEAR(pairing.ours.every_s, (1 + 1 + 100) / 12.0, 1e-9);
   EXPECT_NEAR(pairing.certified.every_s, 2, 1e-9);
   EXPECT_TRUE(std::isnan(pair_up({ours[0]}, certified, Axes(), kGapNs).ours.every_s));
+}
+
+// Ours report twice while the train brakes to a halt between them: nothing that was said is wrong.
+TEST(Pairing, ATrainMayBrakeAtAnyTimeBetweenTwoReports) {
+  const auto one = [](double certified_kmh) {
+    return pair_up({report(0, kA, 0, 60), report(10, kA, 80, 0)}, {report(5, kA, 60, certified_kmh)}, Axes(), kGapNs)
+        .pairs.at(0);
+  };
+  EXPECT_FALSE(one(0).speeds_apart());
+  EXPECT_FALSE(one(60).speeds_apart());
+  EXPECT_NEAR(one(0).faster_kmh, 30, 1e-9);
+  EXPECT_TRUE(one(80).speeds_apart());
+  EXPECT_NEAR(one(80).speed_apart_kmh, 20, 1e-9);
+}
+
+TEST(OtherFields, AreCountedWhereTheyDiffer) {
+  std::vector<TimedReport> ours;
+  std::vector<TimedReport> certified;
+  for (int i = 0; i < 10; ++i) {
+    ours.push_back(report(i, kA, 20 * i));
+    certified.push_back(report(i + 0.5, kA, 20 * i + 10));
+    if (i < 3) ours.back().fields.m_mode = 2;
+    if (i < 2) ours.back().fields.m_level = etcs::kLevel1;
+    if (i < 5) ours.back().fields.q_length = etcs::kConfirmedByDevice;
+    if (i < 4) certified.back().fields.q_length = etcs::kConfirmedByDevice;
+    if (i < 5) ours.back().fields.l_trainint = 203;
+    if (i < 4) certified.back().fields.l_trainint = 210;
+  }
+  const auto other = other_fields_of(pair_up(ours, certified, Axes(), kGapNs).pairs);
+  EXPECT_EQ(other.modes, 3U);
+  EXPECT_EQ(other.levels, 2U);
+  EXPECT_EQ(other.integrity, 1U);
+  EXPECT_EQ(other.both_lengths, 4U);
+  EXPECT_NEAR(other.longer_m, 3, 0.1) << "it has run 10 m since";
 }
 
 }  // namespace

@@ -192,5 +192,16 @@ TEST(Ring, AGroupIsPassedAgainByATrainThatSetsBackAndNotByOneThatTrembles) {
   EXPECT_EQ(run({92, 99, 105}), before + 2);
 }
 
+// Groups between were not passed, and what lies ahead is none that was.
+TEST_F(Tracker, AJumpOnItsEdgePassesNothing) {
+  tracker.update(forward(1, 950), true);
+  expect(kC, 250);
+  tracker.update(forward(1, 350), true);
+  expect(kA, 250);
+  EXPECT_FALSE(tracker.reference()->passed);
+  EXPECT_EQ(tracker.taken_back(), 1U);
+  EXPECT_FALSE(tracker.step_m().has_value());
+}
+
 }  // namespace
 }  // namespace railfix::tpr_publisher

@@ -62,6 +62,71 @@ TEST(OnboardUnit, AModeThereAndBackBetweenTwoPositionsIsReported) {
   EXPECT_EQ(report->fields.m_mode, 0U);
 }
 
+// From the last one that was heard, not from the last report.
+TEST(OnboardUnit, TheFirstWantOfOneThatBeganAnewIsReported) {
+  TprPublisher publisher(balise_map(), settings());
+  double run_s = 0;
+  const auto reported = [&](uint32_t wanted, Reason because) -> std::optional<Reason> {
+    Onboard onboard;
+    onboard.stamp_ns = kStart + core::to_ns(run_s += 0.1);
+    onboard.reports_wanted = wanted;
+    onboard.wanted_because = because;
+    core::ok_or_throw(publisher.set_onboard(onboard, onboard.stamp_ns));
+    const auto report = publisher.update(at(forward(1, 450), run_s, 0), onboard.stamp_ns).report;
+    return report ? std::optional(report->reason) : std::nullopt;
+  };
+  EXPECT_EQ(reported(0, Reason{}), Reason::start);
+  EXPECT_EQ(reported(1, Reason::border), Reason::border);
+  EXPECT_EQ(reported(1, Reason::border), std::nullopt);
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(reported(0, Reason{}), std::nullopt) << "it began anew";
+  EXPECT_EQ(reported(1, Reason::session), Reason::session);
+  EXPECT_EQ(reported(2, Reason::error), Reason::error);
+  EXPECT_EQ(reported(1, Reason::session), Reason::session) << "anew, and it has not said 0";
+}
+
+// A mode of 4.0.0 from the on-board unit of a train that reports in 3.x.
+TEST(OnboardUnit, AModeThatCannotBeSaidTakesNothingAlong) {
+  TprPublisher publisher(balise_map(), settings());
+  ASSERT_TRUE(publisher.update(at(forward(1, 450), 0, 20), kStart).report.has_value());
+  Onboard onboard;
+  onboard.stamp_ns = kStart;
+  onboard.m_mode = 17;
+  onboard.m_level = etcs::kLevel1;
+  onboard.q_integrity = etcs::kIntegrityLost;
+  onboard.reports_wanted = 1;
+  onboard.wanted_because = Reason::border;
+  std::vector<Reason> reasons;
+  etcs::TrainPositionReport fields;
+  for (int i = 1; i < 5; ++i) {
+    EXPECT_THAT(publisher.set_onboard(onboard, kStart).error().message, HasSubstr("M_MODE"));
+    const auto position = at(forward(1, 450 + i), 0.05 * i, 20);
+    const auto report = publisher.update(position, position.stamp_ns).report;
+    if (!report) continue;
+    reasons.push_back(report->reason);
+    fields = report->fields;
+  }
+  EXPECT_THAT(reasons, ::testing::ElementsAre(Reason::level)) << "one report says all of it";
+  EXPECT_EQ(fields.m_level, uint32_t{etcs::kLevel1});
+  EXPECT_EQ(fields.q_length, uint32_t{etcs::kIntegrityLost});
+  EXPECT_EQ(fields.m_mode, 0U);
+}
+
+TEST(OnboardUnit, Level3IsLevel2In4) {
+  auto four = settings();
+  four.report.baseline = etcs::Baseline::b4;
+  TprPublisher publisher(balise_map(), four);
+  ASSERT_TRUE(publisher.mode_assumed());
+  Onboard onboard;
+  onboard.stamp_ns = kStart;
+  onboard.m_mode = 2;
+  onboard.m_level = etcs::kLevel3;
+  ASSERT_TRUE(publisher.set_onboard(onboard, kStart).ok());
+  EXPECT_FALSE(publisher.mode_assumed());
+  const auto fields = publisher.update(at(forward(1, 450), 0, 20), kStart).report.value().fields;
+  EXPECT_EQ(fields.m_mode, 2U);
+  EXPECT_EQ(fields.m_level, uint32_t{etcs::kLevel2});
+}
+
 TEST(OnboardUnit, AnNtcIsOfLevelNtcOnly) {
   TprPublisher publisher(balise_map(), settings());
   ASSERT_TRUE(publisher.update(at(forward(1, 450), 0, 20), kStart).report.has_value());

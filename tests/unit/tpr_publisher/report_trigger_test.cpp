@@ -76,6 +76,26 @@ TEST_F(Trigger, ReportsEveryDCyclocMetresEitherWay) {
   EXPECT_EQ(step(), Reason::cycle_distance);
 }
 
+// A train that is moved to and fro, and one that stands and whose place trembles.
+TEST_F(Trigger, DCyclocCountsTheWayThatWasRun) {
+  auto wanted = parameters();
+  wanted.t_cycloc = etcs::kNoCycleTime;
+  wanted.q_scale = 2;
+  wanted.d_cycloc = 5;  // 50 m
+  ask(wanted);
+  step();
+  int reports = 0;
+  for (int i = 0; i < 300; ++i) {
+    run(0.1, i / 50 % 2 == 0 ? 0.8 : -0.8);
+    reports += step() == Reason::cycle_distance ? 1 : 0;
+  }
+  EXPECT_EQ(reports, 4) << "240 m";
+  for (int i = 0; i < 3000; ++i) {
+    run(0.1, i % 2 == 0 ? 0.3 : -0.3);
+    EXPECT_EQ(step(), std::nullopt);
+  }
+}
+
 TEST_F(Trigger, InfiniteCyclesNeverReport) {
   ask(etcs::ReportParameters{});
   step();
@@ -133,6 +153,45 @@ TEST_F(Trigger, AnLrbgThatComesAndGoesFillsNoStore) {
   }
   EXPECT_GE(reports, 3);
   EXPECT_LE(reports, 7);
+}
+
+// As at a track_probability that trembles about 0.999 behind a switch with a group on its leg.
+TEST_F(Trigger, AGroupThatIsTakenBackAndTakenAgainFillsNoStore) {
+  moment.nid_lrbg = 7;
+  step();
+  for (const uint32_t m_loc : {etcs::kReportAtGroups, etcs::kReportNotAtGroups}) {
+    auto wanted = parameters();
+    wanted.m_loc = m_loc;
+    ask(wanted);
+    int reports = 0;
+    for (int i = 0; i < 200; ++i) {  // 10 s
+      const bool taken_back = i % 2 != 0;
+      moment.nid_lrbg = taken_back ? 7 : 8;
+      if (taken_back) ++moment.taken_back;
+      run(0.05, 0);
+      reports += step() ? 1 : 0;
+    }
+    EXPECT_LE(reports, 21) << m_loc;
+  }
+}
+
+TEST_F(Trigger, AGroupOfAnotherTrackIsSaidAtOnceWhateverMLoc) {
+  auto wanted = parameters();
+  wanted.m_loc = etcs::kReportNotAtGroups;
+  ask(wanted);
+  moment.nid_lrbg = 7;
+  moment.q_dirlrbg = etcs::kNominal;
+  step();
+  ++moment.taken_back;
+  EXPECT_EQ(step(), std::nullopt) << "it is the same one again";
+  run(1, 0);
+  moment.nid_lrbg = 8;
+  EXPECT_EQ(step(), Reason::balise_group);
+  run(1, 0);
+  ++moment.taken_back;
+  moment.q_dirlrbg = etcs::kReverse;
+  EXPECT_EQ(step(), Reason::balise_group) << "the train looks the other way";
+  EXPECT_EQ(step(), std::nullopt);
 }
 
 TEST_F(Trigger, NowReportsAtOnce) {
@@ -380,23 +439,10 @@ TEST_F(Trigger, TheOnboardUnitCallsForReports) {
   moment.onboard.integrity_ns = 6;  // confirmed again
   expect_once(Reason::integrity_confirmed);
   for (const auto reason : {Reason::border, Reason::session, Reason::error}) {
-    ++moment.onboard.reports_wanted;
-    moment.onboard.wanted_because = reason;
+    ++moment.wants;
+    moment.wanted_because = reason;
     expect_once(reason);
   }
-}
-
-TEST_F(Trigger, AnOnboardUnitThatBeganAgainWantsNothingUntilItSaysSo) {
-  moment.onboard.reports_wanted = 5;
-  moment.onboard.wanted_because = Reason::border;
-  step();
-  moment.onboard.reports_wanted = 0;
-  moment.onboard.wanted_because = Reason{};
-  EXPECT_EQ(step(), std::nullopt);
-  moment.onboard.reports_wanted = 1;
-  moment.onboard.wanted_because = Reason::session;
-  EXPECT_EQ(step(), Reason::session);
-  EXPECT_EQ(step(), std::nullopt);
 }
 
 TEST_F(Trigger, StaysDueUntilSent) {

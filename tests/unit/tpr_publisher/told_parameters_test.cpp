@@ -242,6 +242,16 @@ TEST_F(ToldParametersTest, TheSameBitsOnceMoreAreAPacketWhereThatIsCounted) {
   EXPECT_FALSE(hear(9)) << "by somebody else who counts";
 }
 
+TEST_F(ToldParametersTest, TheSameBitsFromOneThatBeganAnewAreAPacket) {
+  follow_train();
+  const auto bits = packet(etcs::kUnknownSide, {{100, 1}});
+  EXPECT_TRUE(told.hear(bits, true, kA, 1));
+  EXPECT_FALSE(told.hear(bits, true, kA, 1));
+  EXPECT_FALSE(told.hear({}, true, 0, 0)) << "it has none yet";
+  EXPECT_TRUE(told.hear(bits, true, kA, 1));
+  EXPECT_FALSE(told.hear(bits, true, kA, 1));
+}
+
 TEST_F(ToldParametersTest, DeletedOnesGiveThoseOfTheKeysBack) {
   follow_train();
   EXPECT_FALSE(told.hear_deleted());

@@ -127,7 +127,8 @@ TEST(TprPublisher, ACorrectionAtRestIsNoMovement) {
       said = direction(150.2 + corrected_m + 0.012 * i, i == 1 ? -0.01 : 0.12, false);
     EXPECT_EQ(said, etcs::kNominal) << corrected_m;
     direction(150.5 + corrected_m, 0, true);
-    EXPECT_EQ(direction(150.0 + corrected_m, -0.2, false), etcs::kReverse) << corrected_m;
+    for (int i = 1; i <= 3; ++i) direction(150.5 + corrected_m - 0.02 * i, -0.2, true);
+    EXPECT_EQ(direction(150.42 + corrected_m, -0.2, false), etcs::kReverse) << corrected_m;
   }
 }
 
@@ -233,6 +234,52 @@ TEST(TprPublisher, TrainborneTimeGoesOnWhenTheClockIsSetBack) {
     t_train.push_back(report->fields.t_train - tpr_publisher::t_train(kStart));
   }
   EXPECT_EQ(t_train, (std::vector<uint32_t>{0, 700, 701, 1401, 2101}));
+}
+
+// Two hosts whose clocks are 0.9 s apart: whoever takes over is not out of order.
+TEST(TprPublisher, TrainborneTimeGoesOnWhereAnotherOneReported) {
+  TprPublisher publisher(balise_map(), settings());
+  const auto t_train = [](double run_s) { return tpr_publisher::t_train(kStart + core::to_ns(run_s)); };
+  publisher.watch(at(forward(1, 150), 0, 0), kStart);
+  publisher.hear_trainborne(t_train(0.9), kStart);
+  publisher.hear_trainborne(t_train(0.4), kStart);
+  publisher.hear_trainborne(etcs::kUnknownTime, kStart);
+  std::vector<uint32_t> said;
+  for (const double run_s : {0.1, 6.1}) {
+    const auto position = at(forward(1, 150), run_s, 0);
+    said.push_back(publisher.update(position, position.stamp_ns).report.value().fields.t_train);
+  }
+  EXPECT_THAT(said, ElementsAre(t_train(0.91), t_train(6.91)));
+}
+
+TEST(TprPublisher, TrainborneTimeIsNotBeforeThePosition) {
+  TprPublisher publisher(balise_map(), settings());
+  for (const double run_s : {0.0, 7.0}) {
+    const auto position = at(forward(1, 150), run_s, 0);
+    const auto report = publisher.update(position, position.stamp_ns - core::to_ns(0.9)).report;
+    ASSERT_TRUE(report.has_value());
+    EXPECT_EQ(report->fields.t_train, tpr_publisher::t_train(position.stamp_ns));
+  }
+}
+
+// Corrected to the track beside, which a map_matcher was as sure of.
+TEST(TprPublisher, AnotherTrackIsSaidAtOnce) {
+  auto seldom = settings();
+  seldom.parameters.m_loc = etcs::kReportNotAtGroups;
+  TprPublisher publisher(balise_map(), seldom);
+  ASSERT_EQ(publisher.update(at(forward(1, 750), 0, 20), kStart).report.value().fields.nid_lrbg, kC);
+  auto position = at(reverse(3, 80), 0.1, 20);
+  position.distance_m = 752;
+  auto report = publisher.update(position, position.stamp_ns).report;
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->reason, Reason::balise_group);
+  EXPECT_EQ(report->fields.nid_lrbg, kE);
+  position = at(forward(3, 450), 1.2, 20);  // the camera looks the other way there
+  position.distance_m = 774;
+  report = publisher.update(position, position.stamp_ns).report;
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(report->fields.nid_lrbg, kE);
+  EXPECT_EQ(report->fields.q_dirlrbg, uint32_t{etcs::kNominal});
 }
 
 TEST(TprPublisher, WithoutAMapTheReferenceIsUnknown) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "evaluation/statistics.hpp"
 
@@ -14,6 +15,7 @@ namespace {
 constexpr double kSeldom = 1.1;
 constexpr double kSigmas = 3;
 constexpr double kLeastShiftS = 1e-3;  // rounding alone is no shift
+constexpr double kChance = 0.01;       // of all pairs
 constexpr double kSmall = 0.2;         // a fifth of the error makes 2 % of its root mean square
 
 /// What a shift of the stamps is held against: the certified system's error, or without a truth half its interval.
@@ -34,6 +36,40 @@ std::optional<StampsOff> stamps_off(const std::vector<Pair>& pairs, const std::o
   return StampsOff{shift.shift_s, offset_s - shift.shift_s, judge.has_value()};
 }
 
+/// Pairs that contradict each other, by leg.
+class Contradicted {
+ public:
+  explicit Contradicted(size_t pairs) : most_(kChance * static_cast<double>(pairs)) {}
+  void add(size_t leg, bool apart) {
+    auto& [all, bad] = legs_[leg];
+    ++all;
+    bad += apart;
+    sum_ += apart;
+  }
+  [[nodiscard]] size_t legs() const {
+    const bool often = static_cast<double>(sum_) > most_;
+    return static_cast<size_t>(std::ranges::count_if(legs_, [&](const auto& leg) {
+      const auto [all, bad] = leg.second;
+      return bad > 0 && (often || bad > 1 || 2 * bad >= all);
+    }));
+  }
+
+ private:
+  double most_;
+  size_t sum_ = 0;
+  std::map<size_t, std::pair<size_t, size_t>> legs_;  // pairs, and those that contradict
+};
+
+/// Where the driver changes the cab or the train sets back the two may say so one report apart.
+bool beside_change(const std::vector<Pair>& pairs, size_t i, double PlacedReport::*way) {
+  const auto changes = [&](size_t before, size_t after) {
+    const auto& a = pairs[before].certified;
+    const auto& b = pairs[after].certified;
+    return a.axis == b.axis && a.*way * b.*way < 0;
+  };
+  return (i > 0 && changes(i - 1, i)) || (i + 1 < pairs.size() && changes(i, i + 1));
+}
+
 }  // namespace
 
 bool Doubts::ours_seldom() const {
@@ -50,21 +86,25 @@ TimeShift shift_to_truth(const std::vector<Pair>& pairs, const Judge& judge) {
 }
 
 Doubts doubts_of(const Pairing& pairing, const std::optional<Judge>& judge, double offset_s) {
+  const auto& pairs = pairing.pairs;
   std::set<size_t> apart;
-  std::map<size_t, int> turned;  // pairs of the leg that are, less those that are not
-  std::map<size_t, int> runs_apart;
-  for (const auto& pair : pairing.pairs) {
+  Contradicted turned(pairs.size());
+  Contradicted runs_apart(pairs.size());
+  Contradicted speeds_apart(pairs.size());
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    const auto& pair = pairs[i];
     if (!pair.overlap() && !(judge && judge->covers(pair))) apart.insert(pair.leg);
-    turned[pair.leg] += pair.turned() ? 1 : -1;
-    runs_apart[pair.leg] += pair.runs_apart() ? 1 : -1;
+    turned.add(pair.leg, pair.turned() && !beside_change(pairs, i, &PlacedReport::facing));
+    runs_apart.add(pair.leg, pair.runs_apart() && !beside_change(pairs, i, &PlacedReport::running));
+    speeds_apart.add(pair.leg, pair.speeds_apart());
   }
-  // Where the driver changes the cab or the train sets back the two may say so one report apart.
-  const auto most_are = [](const std::map<size_t, int>& legs) {
-    return static_cast<size_t>(std::ranges::count_if(legs, [](const auto& leg) { return leg.second >= 0; }));
-  };
-  return {apart.size(),         most_are(turned),
-          most_are(runs_apart), stamps_off(without_repeats(pairing.pairs), judge, offset_s),
-          pairing.ours.every_s, pairing.certified.every_s};
+  return {apart.size(),
+          turned.legs(),
+          runs_apart.legs(),
+          speeds_apart.legs(),
+          stamps_off(without_repeats(pairs), judge, offset_s),
+          pairing.ours.every_s,
+          pairing.certified.every_s};
 }
 
 }  // namespace railfix::compare

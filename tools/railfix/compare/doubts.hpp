@@ -14,9 +14,11 @@ struct StampsOff {
 
 struct Doubts {
   // Legs on which both cannot be right.
-  size_t apart = 0;       // their intervals have nothing in common, and no truth says who is wrong
-  size_t turned = 0;      // in half of their pairs the train looks the one way in ours and the other way in theirs
-  size_t runs_apart = 0;  // the same of the way that it runs
+  size_t apart = 0;  // their intervals have nothing in common, and no truth says who is wrong
+  // More than a chance report: two of the leg or half of it, or of all pairs more than 1 in 100.
+  size_t turned = 0;                // the train looks the one way in ours and the other way in theirs
+  size_t runs_apart = 0;            // the same of the way that it runs
+  size_t speeds_apart = 0;          // V_TRAIN
   std::optional<StampsOff> stamps;  // by more than chance, and so much that it matters
   double ours_every_s = 0;          // Counted::every_s
   double certified_every_s = 0;

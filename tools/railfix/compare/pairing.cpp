@@ -41,6 +41,23 @@ PlacedReport carried(const PlacedReport& a, const PlacedReport& b, int64_t stamp
   return at;
 }
 
+/// What SUBSET-041 allows: 2 km/h below 30 km/h, from there linear to 12 km/h at 500.
+double speed_allowance_kmh(double speed_kmh) {
+  constexpr double kLowKmh = 30;
+  constexpr double kHighKmh = 500;
+  return 2 + 10 * std::clamp((speed_kmh - kLowKmh) / (kHighKmh - kLowKmh), 0.0, 1.0);
+}
+
+/// Between two reports of ours a train may have braked at any time.
+void compare_speeds(const PlacedReport& last, const PlacedReport& next, Pair& pair) {
+  const double speed = speed_kmh(pair.certified.fields);
+  const auto [low, high] = std::minmax({speed_kmh(last.fields), speed_kmh(next.fields)});
+  pair.speed_apart_kmh = std::max({0.0, low - speed, speed - high});
+  const double gap_s = core::seconds(next.stamp_ns - last.stamp_ns);
+  const double share = gap_s > 0 ? core::seconds(pair.stamp_ns - last.stamp_ns) / gap_s : 0;
+  pair.faster_kmh = speed_kmh(last.fields) * (1 - share) + speed_kmh(next.fields) * share - speed;
+}
+
 struct Said {
   int64_t stamp_ns = 0;
   bool interval_known = false;
@@ -139,6 +156,7 @@ std::optional<Pair> paired(const Around& ours, const PlacedReport& certified, in
   pair.certified = certified;
   pair.ours = carried(last, next, certified.stamp_ns, pair.carried_m);
   pair.ours_sent = last;
+  compare_speeds(last, next, pair);
   return pair;
 }
 
@@ -158,6 +176,11 @@ bool Pair::turned() const {
 
 bool Pair::runs_apart() const {
   return ours.speed_mps * certified.speed_mps < 0;
+}
+
+bool Pair::speeds_apart() const {
+  constexpr double kRoundingKmh = etcs::kSpeedStepKmh / 2.0;
+  return speed_apart_kmh > 2 * (kRoundingKmh + speed_allowance_kmh(speed_kmh(certified.fields)));
 }
 
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,

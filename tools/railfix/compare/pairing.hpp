@@ -13,9 +13,11 @@ struct Pair {
   size_t leg = 0;        // certified reports in a row with the same LRBG: errors inside a leg belong together
   size_t stay = 0;       // the same for certified reports in a row at standstill in one place; else each its own
   PlacedReport certified;
-  PlacedReport ours;       // at stamp_ns
-  double carried_m = 0;    // bound of what carrying may add: V_TRAIN is rounded to 5 km/h
-  PlacedReport ours_sent;  // the last one before, as it was sent
+  PlacedReport ours;           // at stamp_ns
+  double carried_m = 0;        // bound of what carrying may add: V_TRAIN is rounded to 5 km/h
+  PlacedReport ours_sent;      // the last one before, as it was sent
+  double faster_kmh = 0;       // V_TRAIN of ours, carried, less that of the certified report
+  double speed_apart_kmh = 0;  // that of the certified report lies so far from what ours said before and behind
   /// Positive: ours lies in front, in the certified report's running direction.
   [[nodiscard]] double difference_m() const;
   /// The two intervals, ours wider by carried_m, have a place in common.
@@ -24,6 +26,8 @@ struct Pair {
   [[nodiscard]] bool turned() const;
   /// Both say which way it runs (Q_DIRTRAIN, and V_TRAIN at least 5 km/h), and not the same.
   [[nodiscard]] bool runs_apart() const;
+  /// Their speeds differ by more than rounding and, of each, SUBSET-041 allow.
+  [[nodiscard]] bool speeds_apart() const;
 };
 
 /// Who had a position with a known interval at the time of a certified report. By the messages alone: what is missing

@@ -14,7 +14,7 @@ namespace {
 double speed_mps(const etcs::TrainPositionReport& fields) {
   if (stands(fields)) return 0;
   if (fields.q_dirtrain == etcs::kUnknownSide) return std::numeric_limits<double>::quiet_NaN();
-  const double speed = core::mps_from_kmh(fields.v_train * etcs::kSpeedStepKmh);
+  const double speed = core::mps_from_kmh(speed_kmh(fields));
   return fields.q_dirtrain == etcs::kNominal ? speed : -speed;
 }
 
@@ -51,6 +51,10 @@ bool stands(const etcs::TrainPositionReport& fields) {
   return fields.v_train == etcs::kStandstillSpeed || fields.v_train == 0;
 }
 
+double speed_kmh(const etcs::TrainPositionReport& fields) {
+  return stands(fields) ? 0 : fields.v_train * etcs::kSpeedStepKmh;
+}
+
 Axes::Axes(const track::Path& path) : line_(std::in_place) {
   for (const auto& mark : path.balise_groups())
     line_->insert({mark.group->nid_lrbg(), {mark.distance_m, mark.nominal_is_along_path}});
@@ -76,9 +80,9 @@ std::optional<PlacedReport> Axes::place(const TimedReport& report) const {
   double ahead_m = etcs::metres_if_known(fields.l_doubtunder, fields.q_scale).value_or(HUGE_VAL);
   if (fields.q_dirlrbg == etcs::kUnknownSide) behind_m = ahead_m = std::max(behind_m, ahead_m);
   if (fields.q_dirlrbg == etcs::kReverse) std::swap(behind_m, ahead_m);
-  PlacedReport placed{report.stamp_ns,    co_ordinate_system(fields), fields.nid_lrbg,   front_m,
-                      front_m - behind_m, front_m + ahead_m,          speed_mps(fields), facing(fields),
-                      running(fields)};
+  PlacedReport placed{
+      report.stamp_ns,   co_ordinate_system(fields), fields.nid_lrbg, front_m,         front_m - behind_m,
+      front_m + ahead_m, speed_mps(fields),          facing(fields),  running(fields), fields};
   if (!line_) return placed;
   const auto group = on_line(fields);
   if (!group) return std::nullopt;

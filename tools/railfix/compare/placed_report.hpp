@@ -19,6 +19,7 @@ struct PlacedReport {
   double speed_mps = 0;  // along the axis, signed; NaN = its sign is not known
   double facing = 0;     // 1 or -1: the way its front end looks along the axis; 0 = it does not say
   double running = 1;  // 1 or -1: the way it runs or, where it does not say, looks, along the axis; also at standstill
+  etcs::TrainPositionReport fields{};  // as they were sent
 };
 
 /// By the message alone, whatever map there is: a group, a distance, a side, and what "nominal" means.
@@ -28,6 +29,8 @@ bool interval_known(const etcs::TrainPositionReport& fields);
 
 /// V_TRAIN says standstill or 0 km/h.
 bool stands(const etcs::TrainPositionReport& fields);
+/// V_TRAIN.
+double speed_kmh(const etcs::TrainPositionReport& fields);
 
 class Axes {
  public:

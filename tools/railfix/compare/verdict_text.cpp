@@ -70,6 +70,10 @@ std::string text_of(const Doubts& doubts) {
     return text_of("on %zu legs the train runs the other way in ours (Q_DIRTRAIN), so one side is wrong",
                    doubts.runs_apart);
   }
+  if (doubts.speeds_apart > 0) {
+    return text_of("on %zu legs the speeds differ by more than both may be off (V_TRAIN), so one side is wrong",
+                   doubts.speeds_apart);
+  }
   if (doubts.stamps) return text_of_stamps(*doubts.stamps);
   if (doubts.apart > 0) {
     return text_of(
