@@ -141,6 +141,31 @@ TEST(SurveyApart, AThingWhoseSightingsAreAtOddsMakesNoOtherVaguer) {
   EXPECT_NEAR(new_mast(), alone_m, 0.01);
 }
 
+// Runs whose wheels or camera count 0.4 % too much, put right at every frog: no frog has moved, at the ends neither.
+TEST(SurveyApart, AScaleOfTheRunsMovesNothing) {
+  PassesOfAMovedMast line(0, 0, 1);
+  line.map.edges = {{1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{8000, 0, 0}})}};
+  line.map.landmarks.clear();
+  core::Random random(9);
+  for (uint32_t id = 1; id <= 15; ++id)
+    line.map.landmarks.push_back({id, LandmarkKind::frog, 1, 500.0 * id, 0, 0.05, ""});
+  for (size_t run = 0; run < 3; ++run) {
+    for (const auto& frog : line.map.landmarks) {
+      const double at_m = frog.offset_m;
+      const double place_m = at_m + 0.004 * 490;
+      line.sightings.push_back({run, 1.004 * at_m, LandmarkKind::frog, 1, place_m + random.normal(0, 0.05), 0, 0.07,
+                                0.75, place_m - 1.004 * at_m});
+    }
+  }
+  const Survey survey = survey_landmarks(line.map, line.sightings, {});
+  ASSERT_EQ(survey.landmarks.size(), 15U);
+  for (const auto& found : survey.landmarks) {
+    EXPECT_EQ(found.runs_apart, 0U) << found.landmark.offset_m;
+    EXPECT_NEAR(found.moved_m, 0, 0.1);
+    EXPECT_LE(found.landmark.sigma_m, 0.05);
+  }
+}
+
 // A run that is placed anew has a way of its own: nothing joins it to the one before.
 TEST(SurveyApart, StretchesOfARunAreNotJoined) {
   PassesOfAMovedMast passes(2, 0, 7);
