@@ -215,7 +215,8 @@ TEST_F(Train, MapLearnFindsTheLandmarksAgain) {
         error_m = std::min(error_m, std::abs(real.offset_m - mark.offset_m));
     }
     EXPECT_LT(error_m, 4 * mark.sigma_m) << track::to_string(mark.kind) << " at " << mark.offset_m;
-    EXPECT_LT(mark.sigma_m, 1) << track::to_string(mark.kind) << " at " << mark.offset_m;
+    EXPECT_LT(mark.sigma_m, 1.5)  // GNSS alone: a quarter of the promised interval
+        << track::to_string(mark.kind) << " at " << mark.offset_m;
   }
 }
 

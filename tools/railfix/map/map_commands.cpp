@@ -1,6 +1,7 @@
 #include "map/map_commands.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -37,35 +38,53 @@ struct LearnRequest {
   SurveyOptions options;
 };
 
-int learn(const LearnRequest& request) {
-  std::vector<std::filesystem::path> inputs(request.runs.begin(), request.runs.end());
-  inputs.emplace_back(request.map);
-  check_output("--out", request.out, inputs);
-  const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
-  const auto [sightings, placeless, runs] =
-      core::value_or_throw(read_runs(map, {request.runs.begin(), request.runs.end()}));
-  const Survey survey = survey_landmarks(*map, sightings, request.options);
-  track::Map updated = *map;
-  apply_survey(survey, updated);
-  updated.learnt_runs.insert(updated.learnt_runs.end(), runs.begin(), runs.end());
-  core::ok_or_throw(updated.save(request.out));
-  say_beside({request.out});
+void print_runs(const ReadSightings& read, const LearnRequest& request, const Survey& survey) {
   std::printf(
       "sightings        %zu of %zu runs, %zu used, %zu outliers, %zu of new things seen by fewer than %zu runs\n",
-      sightings.size(), request.runs.size(), survey.sightings, survey.outliers, survey.left_alone,
+      read.placed.size(), request.runs.size(), survey.sightings, survey.outliers, survey.left_alone,
       request.options.least_runs);
-  if (placeless > 0)
-    std::printf("without a place  %zu more, where the track was not known or is not on the map\n", placeless);
+  if (read.placeless > 0)
+    std::printf("without a place  %zu more, where track or place was not known or is not on the map\n", read.placeless);
+  if (read.doubtful > 0)
+    std::printf("left out         %zu more, of a confidence below %.2f or a kind that no camera tells\n", read.doubtful,
+                kLeastConfidence);
   for (size_t run = 0; run < request.runs.size(); ++run) {
-    if (std::ranges::none_of(sightings, [run](const SurveySighting& sighting) { return sighting.run == run; }))
-      std::printf("nothing seen     %s has no sighting with a place on the map\n", request.runs[run].c_str());
+    const char* name = request.runs[run].c_str();
+    if (std::ranges::count(read.never_confirmed, run) > 0)
+      std::printf("not confirmed    %s teaches nothing: its place was told, and nothing on its way confirmed it\n",
+                  name);
+    else if (std::ranges::none_of(read.placed, [run](const SurveySighting& seen) { return seen.run == run; }))
+      std::printf("nothing seen     %s has no sighting with a place on the map\n", name);
   }
   std::printf("errors           %.2f of their sigmas (rms)\n", survey.spread);
-  if (known_ones_stay(*map))
-    std::printf(
-        "known ones       stay: the map has learnt from %zu runs before, and all sightings of a thing err alike; to "
-        "better them, learn from all runs at once on the map of before\n",
-        map->learnt_runs.size());
+}
+
+std::string named(const track::Landmark& mark) {
+  std::array<char, 32> at{};
+  std::snprintf(at.data(), at.size(), " at %u:%.1f", mark.edge, mark.offset_m);
+  const std::string name = mark.name.empty() ? "" : " " + mark.name;
+  return track::to_string(mark.kind) + " " + std::to_string(mark.id) + name + at.data();
+}
+
+/// What the map and the runs do not agree in.
+void print_contradictions(const track::Map& map, const ReadSightings& read, const LearnRequest& request,
+                          const Survey& survey) {
+  for (const SurveyedLandmark& found : survey.landmarks) {
+    if (found.runs_apart == 0) continue;
+    const bool taken = found.runs_apart >= request.options.least_runs;
+    std::printf("elsewhere        %s: %zu of %zu runs see it %+.2f m from there; %s\n",
+                named(map.landmarks[found.known_id - 1]).c_str(), found.runs_apart, found.runs, found.apart_m,
+                taken ? "taken, with a sigma that holds both" : "too few, it stays");
+  }
+  constexpr size_t kMostTold = 20;
+  const auto unseen = unseen_landmarks(map, survey, read.placed, read.passed, request.options.least_runs);
+  for (size_t i = 0; i < std::min(unseen.size(), kMostTold); ++i)
+    std::printf("not seen         %s: by none of the %zu runs that passed it; it stays\n",
+                named(*unseen[i].known).c_str(), unseen[i].runs);
+  if (unseen.size() > kMostTold) std::printf("not seen         and %zu more\n", unseen.size() - kMostTold);
+}
+
+void print_landmarks(const Survey& survey) {
   std::puts("");
   std::printf("%-10s %6s %12s %9s %9s %5s %9s  %s\n", "kind", "edge", "offset [m]", "sigma [m]", "moved [m]", "runs",
               "sightings", "on the map as");
@@ -75,6 +94,28 @@ int learn(const LearnRequest& request) {
                 mark.offset_m, mark.sigma_m, found.moved_m, found.runs, found.sightings,
                 found.known_id != 0 ? (std::to_string(found.known_id) + " " + mark.name).c_str() : "new");
   }
+}
+
+int learn(const LearnRequest& request) {
+  std::vector<std::filesystem::path> inputs(request.runs.begin(), request.runs.end());
+  inputs.emplace_back(request.map);
+  check_output("--out", request.out, inputs);
+  const auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(request.map)));
+  const ReadSightings read = core::value_or_throw(read_runs(map, {request.runs.begin(), request.runs.end()}));
+  const Survey survey = survey_landmarks(*map, read.placed, request.options);
+  track::Map updated = *map;
+  apply_survey(survey, updated);
+  updated.learnt_runs.insert(updated.learnt_runs.end(), read.runs.begin(), read.runs.end());
+  core::ok_or_throw(updated.save(request.out));
+  say_beside({request.out});
+  print_runs(read, request, survey);
+  if (known_ones_stay(*map))
+    std::printf(
+        "known ones       stay: the map has learnt from %zu runs before, and all sightings of a thing err alike; to "
+        "better them, learn from all runs at once on the map of before\n",
+        map->learnt_runs.size());
+  print_contradictions(*map, read, request, survey);
+  print_landmarks(survey);
   std::printf("written          %s\n", request.out.c_str());
   return 0;
 }

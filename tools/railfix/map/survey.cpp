@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 
+#include "map/survey_apart.hpp"
 #include "map/survey_known.hpp"
 #include "map/survey_solver.hpp"
 
@@ -85,39 +87,91 @@ size_t leave_alone(std::vector<Thing>& things, const std::vector<SurveySighting>
   return left_alone;
 }
 
-/// Sightings, outliers and spread.
-void judge(const SurveySolver& solver, const std::vector<Thing>& things, Survey& survey) {
+/// Sightings, outliers and spread; and by how much the sigma of each thing is to be widened: where the sightings of one
+/// are at odds among themselves, that is its own matter.
+std::vector<double> judge(const SurveySolver& solver, const std::vector<Thing>& things, Survey& survey) {
   constexpr double kOutlier = 2.0 * SurveySolver::kHuber;
+  constexpr double kAtOdds = 2.0;
+  std::vector<double> own(things.size(), 0);
   double squares = 0;
+  double count = 0;
   for (size_t t = 0; t < things.size(); ++t) {
+    double of_thing = 0;
     for (const size_t i : things[t].sightings) {
       const double error = std::abs(solver.error(t, i));
-      ++survey.sightings;
       if (error > kOutlier) ++survey.outliers;
-      squares += std::pow(std::min(error, kOutlier), 2);
+      of_thing += std::pow(std::min(error, kOutlier), 2);
     }
+    const size_t sightings = things[t].sightings.size();
+    survey.sightings += sightings;
+    own[t] = sightings > 1 ? std::sqrt(of_thing / static_cast<double>(sightings - 1)) : 0;
+    if (own[t] > kAtOdds) continue;
+    squares += of_thing;
+    count += static_cast<double>(sightings);
   }
-  survey.spread = std::sqrt(squares / static_cast<double>(survey.sightings));
+  survey.spread = count > 0 ? std::sqrt(squares / count) : 0;
+  for (double& widening : own) widening = std::max({1.0, survey.spread, widening > kAtOdds ? widening : 0.0});
+  return own;
 }
 
-SurveyedLandmark landmark_of(const track::Map& map, const Thing& thing, const std::vector<SurveySighting>& all,
-                             double place_m, double sigma_m) {
-  SurveyedLandmark found;
-  const SurveySighting& first = all[thing.sightings.front()];
-  if (thing.known != nullptr) {
-    found.known_id = thing.known->id;
-    found.landmark = *thing.known;
-  } else {
-    double lateral_m = 0;
-    for (const size_t i : thing.sightings) lateral_m += all[i].lateral_m / static_cast<double>(thing.sightings.size());
-    found.landmark = {0, first.kind, first.edge, 0, lateral_m, 0, ""};
+/// The side that is not known (0) counts for nothing.
+double mean_lateral_m(const Thing& thing, const std::vector<SurveySighting>& all) {
+  double sum_m = 0;
+  double count = 0;
+  for (const size_t i : thing.sightings) {
+    sum_m += all[i].lateral_m;
+    count += all[i].lateral_m != 0 ? 1 : 0;
   }
-  found.sightings = thing.sightings.size();
-  found.runs = runs_of(thing, all);
-  if (thing.known != nullptr && known_ones_stay(map)) return found;
-  found.landmark.offset_m = std::clamp(place_m, 0.0, map.edge(first.edge)->alignment.length_m());
-  found.landmark.sigma_m = sigma_m;
-  found.moved_m = thing.known != nullptr ? found.landmark.offset_m - thing.known->offset_m : 0.0;
+  return count > 0 ? sum_m / count : 0;
+}
+
+bool one_side(const Thing& thing, const std::vector<SurveySighting>& all) {
+  const auto on = [&](double sign) {
+    return std::ranges::any_of(thing.sightings, [&](size_t i) { return sign * all[i].lateral_m > 0; });
+  };
+  return !on(1) || !on(-1);
+}
+
+/// Runs that see it nearer to the survey's place than to the map's.
+size_t runs_apart(const Thing& thing, const std::vector<SurveySighting>& all, const SurveySolver& solver,
+                  double place_m) {
+  std::map<size_t, std::vector<double>> nearer_m;
+  for (const size_t i : thing.sightings) {
+    const double seen_m = solver.seen_at(i);
+    nearer_m[all[i].run].push_back(std::abs(seen_m - thing.known->offset_m) - std::abs(seen_m - place_m));
+  }
+  return static_cast<size_t>(std::ranges::count_if(
+      nearer_m, [](const auto& run) { return std::accumulate(run.second.begin(), run.second.end(), 0.0) > 0; }));
+}
+
+SurveyedLandmark new_landmark(const Thing& thing, const std::vector<SurveySighting>& all, PlaceEstimate place) {
+  const SurveySighting& first = all[thing.sightings.front()];
+  SurveyedLandmark found;
+  found.landmark = {0, first.kind, first.edge, place.place_m, mean_lateral_m(thing, all), place.sigma_m, ""};
+  return found;
+}
+
+/// Never vaguer than on the map, unless several runs see it elsewhere: then where they see it, with a sigma that still
+/// holds the map's place.
+SurveyedLandmark known_landmark(const track::Map& map, const Thing& thing, const std::vector<SurveySighting>& all,
+                                const SurveySolver& solver, PlaceEstimate place, size_t least_runs) {
+  SurveyedLandmark found;
+  const track::Landmark& known = *thing.known;
+  found.known_id = known.id;
+  found.landmark = known;
+  if (has_side(known.kind) && known.lateral_m == 0 && one_side(thing, all))
+    found.landmark.lateral_m = mean_lateral_m(thing, all);
+  if (thing.is_apart) {
+    found.runs_apart = runs_apart(thing, all, solver, place.place_m);
+    found.apart_m = place.place_m - known.offset_m;
+    if (found.runs_apart < least_runs) return found;
+    found.landmark.sigma_m = std::max(place.sigma_m, std::abs(found.apart_m) / kApartSigmas);
+  } else {
+    if (known_ones_stay(map)) return found;
+    found.landmark.sigma_m = std::min(place.sigma_m, known.sigma_m);
+  }
+  found.landmark.offset_m = place.place_m;
+  found.moved_m = place.place_m - known.offset_m;
   return found;
 }
 
@@ -141,13 +195,23 @@ Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>
     std::vector<Thing> things = things_of(map, sightings, places, options.gate_m);
     out.left_alone = leave_alone(things, sightings, options.least_runs);
     if (things.empty()) return out;
-    const SurveySolver solver(sightings, things, options);
-    for (size_t i = 0; i < sightings.size(); ++i) places[i] = solver.seen_at(i);
-    if (round < kRounds) continue;  // runs that lay apart are together now: what belongs together shows better
-    judge(solver, things, out);
-    for (size_t t = 0; t < things.size(); ++t)
-      out.landmarks.push_back(
-          landmark_of(map, things[t], sightings, solver.place(t), solver.sigma(t) * std::max(1.0, out.spread)));
+    if (round < kRounds) {  // runs that lay apart come together: then what belongs together shows better
+      const SurveySolver solver(sightings, things, options);
+      for (size_t i = 0; i < sightings.size(); ++i) places[i] = solver.seen_at(i);
+      continue;
+    }
+    const auto solver = solve_without_moved(sightings, things, options);
+    const std::vector<double> widening = judge(*solver, things, out);
+    for (size_t t = 0; t < things.size(); ++t) {
+      const uint32_t edge = sightings[things[t].sightings.front()].edge;
+      const double place_m = std::clamp(solver->place(t), 0.0, map.edge(edge)->alignment.length_m());
+      const PlaceEstimate place{place_m, solver->sigma(t) * widening[t]};
+      out.landmarks.push_back(things[t].known == nullptr
+                                  ? new_landmark(things[t], sightings, place)
+                                  : known_landmark(map, things[t], sightings, *solver, place, options.least_runs));
+      out.landmarks.back().sightings = things[t].sightings.size();
+      out.landmarks.back().runs = runs_of(things[t], sightings);
+    }
     return out;
   }
 }
@@ -155,9 +219,10 @@ Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>
 void apply_survey(const Survey& survey, track::Map& map) {
   for (const SurveyedLandmark& found : survey.landmarks) {
     if (found.known_id != 0) {
-      if (known_ones_stay(map)) continue;
+      const bool moves = found.landmark.offset_m != map.landmarks[found.known_id - 1].offset_m ||
+                         found.landmark.sigma_m != map.landmarks[found.known_id - 1].sigma_m;
       map.landmarks[found.known_id - 1] = found.landmark;
-      if (found.landmark.kind == track::LandmarkKind::balise) move_group(found, map);
+      if (moves && found.landmark.kind == track::LandmarkKind::balise) move_group(found, map);
       continue;
     }
     track::Landmark added = found.landmark;

@@ -73,7 +73,7 @@ class PassMarks {
 std::vector<std::vector<size_t>> passes_of(const std::vector<SurveySighting>& all) {
   const auto key = [&](size_t i) {
     const bool left = has_side(all[i].kind) && all[i].lateral_m >= 0;
-    return std::tuple(all[i].run, all[i].edge, all[i].kind, left);
+    return std::tuple(all[i].run, all[i].stretch, all[i].edge, all[i].kind, left);
   };
   std::vector<size_t> sorted(all.size());
   for (size_t i = 0; i < sorted.size(); ++i) sorted[i] = i;

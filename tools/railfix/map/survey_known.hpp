@@ -22,7 +22,7 @@ inline constexpr double kOnePassM = 50;  // of a run: no thing is passed twice w
 /// Passed by one run one behind the other: two things, however near.
 inline bool told_apart(const SurveySighting& a, const SurveySighting& b) {
   constexpr double kTwiceToldM = 0.5;  // ... but it may be told twice
-  return a.run == b.run && std::abs(a.way_m - b.way_m) < kOnePassM &&
+  return a.run == b.run && a.stretch == b.stretch && std::abs(a.way_m - b.way_m) < kOnePassM &&
          std::abs(a.unmoved_m() - b.unmoved_m()) > kTwiceToldM;
 }
 

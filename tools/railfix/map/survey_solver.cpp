@@ -31,22 +31,24 @@ SurveySolver::SurveySolver(const std::vector<SurveySighting>& all, const std::ve
                            const SurveyOptions& options)
     : all_(all), things_(things), options_(options) {
   for (const auto& seen : all) {
-    for (const int64_t k : {knot_of(seen), knot_of(seen) + 1}) knots_.try_emplace({seen.run, k}, 0);
+    for (const int64_t side : {0, 1}) knots_.try_emplace(knot_of(seen, side), 0);
   }
   auto index = static_cast<Eigen::Index>(2 * things_.size());
   for (auto& [key, at] : knots_) at = index++;
   state_ = Eigen::VectorXd::Zero(index);
-  for (size_t t = 0; t < things.size(); ++t)
-    state_[place_index(t)] = things[t].known != nullptr ? things[t].known->offset_m : median_offset(all, things[t]);
+  for (size_t t = 0; t < things.size(); ++t) {
+    const bool is_told = things[t].known != nullptr && !things[t].is_apart;
+    state_[place_index(t)] = is_told ? things[t].known->offset_m : median_offset(all, things[t]);
+  }
   for (const auto& seen : all) {  // a start for the error of the way: the run's place is right
-    for (const int64_t k : {knot_of(seen), knot_of(seen) + 1}) state_[knots_.at({seen.run, k})] = seen.place_ahead_m;
+    for (const int64_t side : {0, 1}) state_[knots_.at(knot_of(seen, side))] = seen.place_ahead_m;
   }
   told_ = told_places();
   for (int round = 0; round < kRounds; ++round) solve();
 }
 
-int64_t SurveySolver::knot_of(const SurveySighting& seen) const {
-  return static_cast<int64_t>(std::floor(seen.way_m / options_.knot_m));
+SurveySolver::Knot SurveySolver::knot_of(const SurveySighting& seen, int64_t side) const {
+  return {seen.run, seen.stretch, static_cast<int64_t>(std::floor(seen.way_m / options_.knot_m)) + side};
 }
 
 double SurveySolver::sigma(size_t thing) const {
@@ -55,15 +57,26 @@ double SurveySolver::sigma(size_t thing) const {
   return std::sqrt(factors_.solve(unit)[place_index(thing)]);
 }
 
+// A thing's place is the mean of what the map and what the runs say, by their weights; taken apart again.
+std::optional<PlaceEstimate> SurveySolver::seen_place(size_t thing) const {
+  constexpr double kNothing = 1e-6;  // of the map's weight
+  const PlaceEstimate both{place(thing), sigma(thing)};
+  if (things_[thing].is_apart) return both;
+  const double all = std::pow(both.sigma_m, -2);
+  const double map = weight_of(things_[thing].known->sigma_m);
+  const double runs = all - map;
+  if (runs <= kNothing * map) return std::nullopt;
+  return PlaceEstimate{(all * both.place_m - map * things_[thing].known->offset_m) / runs, 1 / std::sqrt(runs)};
+}
+
 double SurveySolver::own_sigma(size_t sighting) const {
   return std::max(all_[sighting].sigma_m * std::sqrt(1 - options_.common_share), kLeastSigmaM);
 }
 
 SurveySolver::Terms SurveySolver::way_terms(size_t sighting, double sign) const {
   const SurveySighting& seen = all_[sighting];
-  const int64_t knot = knot_of(seen);
-  const double share = seen.way_m / options_.knot_m - static_cast<double>(knot);
-  return {{knots_.at({seen.run, knot}), sign * (1 - share)}, {knots_.at({seen.run, knot + 1}), sign * share}};
+  const double share = seen.way_m / options_.knot_m - std::floor(seen.way_m / options_.knot_m);
+  return {{knots_.at(knot_of(seen, 0)), sign * (1 - share)}, {knots_.at(knot_of(seen, 1)), sign * share}};
 }
 
 SurveySolver::Terms SurveySolver::terms_of(size_t thing, size_t sighting) const {
@@ -94,7 +107,7 @@ void SurveySolver::add(const Terms& terms, double value, double weight) {
 
 void SurveySolver::add_sightings() {
   for (size_t t = 0; t < things_.size(); ++t) {
-    if (const track::Landmark* known = things_[t].known)
+    if (const track::Landmark* known = things_[t].known; known != nullptr && !things_[t].is_apart)
       add({{place_index(t), 1.0}}, known->offset_m, weight_of(known->sigma_m));
     double variance = 0;
     for (const size_t i : things_[t].sightings) {
@@ -108,8 +121,10 @@ void SurveySolver::add_sightings() {
 
 void SurveySolver::add_knots() {
   for (auto knot = knots_.begin(), next = std::next(knot); next != knots_.end(); knot = next++) {
-    if (knot->first.first != next->first.first) continue;
-    const double apart_m = options_.knot_m * static_cast<double>(next->first.second - knot->first.second);
+    const auto& [run, stretch, number] = knot->first;
+    const auto& [next_run, next_stretch, next_number] = next->first;
+    if (run != next_run || stretch != next_stretch) continue;
+    const double apart_m = options_.knot_m * static_cast<double>(next_number - number);
     add({{next->second, 1.0}, {knot->second, -1.0}}, 0, weight_of(options_.drift * apart_m));
   }
 }
@@ -123,11 +138,12 @@ double SurveySolver::told_anew_after_m(double run_sigma_m) const {
 std::vector<SurveySolver::ToldPlace> SurveySolver::told_places() const {
   std::vector<size_t> order(all_.size());
   std::iota(order.begin(), order.end(), 0);
-  std::ranges::sort(order, {}, [&](size_t i) { return std::pair(all_[i].run, all_[i].way_m); });
+  std::ranges::sort(order, {}, [&](size_t i) { return std::tuple(all_[i].run, all_[i].stretch, all_[i].way_m); });
   std::vector<ToldPlace> told;
   for (const size_t i : order) {
     const auto& seen = all_[i];
-    const bool anew = told.empty() || all_[told.back().sighting].run != seen.run ||
+    const auto* before = told.empty() ? nullptr : &all_[told.back().sighting];
+    const bool anew = before == nullptr || before->run != seen.run || before->stretch != seen.stretch ||
                       seen.way_m >= told.back().begin_m + told.back().length_m;
     if (anew) told.push_back({i, seen.way_m, 0});
     auto& last = told.back();

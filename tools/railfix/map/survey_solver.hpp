@@ -7,6 +7,8 @@
 
 #include <Eigen/SparseCholesky>
 #include <map>
+#include <optional>
+#include <tuple>
 #include <vector>
 
 #include "map/survey.hpp"
@@ -17,6 +19,12 @@ namespace railfix::tool {
 struct Thing {
   const track::Landmark* known = nullptr;  // on the map as
   std::vector<size_t> sightings;
+  bool is_apart = false;  // the runs see it elsewhere: what the map knows of its place does not count
+};
+
+struct PlaceEstimate {
+  double place_m = 0;
+  double sigma_m = 0;
 };
 
 class SurveySolver {
@@ -28,6 +36,8 @@ class SurveySolver {
 
   [[nodiscard]] double place(size_t thing) const { return state_[place_index(thing)]; }
   [[nodiscard]] double sigma(size_t thing) const;
+  /// What the runs alone say of a thing that the map knows; nothing where they say next to nothing.
+  [[nodiscard]] std::optional<PlaceEstimate> seen_place(size_t thing) const;
   /// Along its edge, with the error of its run's way taken out.
   [[nodiscard]] double seen_at(size_t sighting) const;
   /// Error of a sighting over the part of its sigma that it has alone.
@@ -35,6 +45,7 @@ class SurveySolver {
 
  private:
   using Terms = std::vector<std::pair<Eigen::Index, double>>;
+  using Knot = std::tuple<size_t, size_t, int64_t>;  // of run, stretch and number along its way
 
   [[nodiscard]] static Eigen::Index place_index(size_t thing) { return static_cast<Eigen::Index>(thing); }
   [[nodiscard]] Eigen::Index common_index(size_t thing) const {
@@ -52,7 +63,8 @@ class SurveySolver {
   /// b(way_m) along the edge.
   [[nodiscard]] Terms way_terms(size_t sighting, double sign) const;
   [[nodiscard]] double own_sigma(size_t sighting) const;
-  [[nodiscard]] int64_t knot_of(const SurveySighting& seen) const;
+  /// The one before a sighting (0) and the one behind it (1).
+  [[nodiscard]] Knot knot_of(const SurveySighting& seen, int64_t side) const;
   [[nodiscard]] double told_anew_after_m(double run_sigma_m) const;
   [[nodiscard]] std::vector<ToldPlace> told_places() const;
   [[nodiscard]] size_t runs_along(const ToldPlace& told) const;
@@ -66,7 +78,7 @@ class SurveySolver {
   const std::vector<SurveySighting>& all_;
   const std::vector<Thing>& things_;
   SurveyOptions options_;
-  std::map<std::pair<size_t, int64_t>, Eigen::Index> knots_;  // of run and number along its way
+  std::map<Knot, Eigen::Index> knots_;
   std::vector<ToldPlace> told_;
   Eigen::VectorXd state_;
   std::vector<Eigen::Triplet<double>> normal_;
