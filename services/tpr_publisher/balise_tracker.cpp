@@ -377,7 +377,8 @@ void BaliseTracker::pass(std::vector<Passed> passed, double step_m) {
     const bool tells = reference_ && !again && std::abs(from_previous_m) > reference_->doubt_m + mark.doubt_m;
     const auto* previous = tells ? reference_->group : nullptr;
     Reference present{mark.group, previous, mark.nominal_along, from_previous_m > 0, foot_m, mark.doubt_m, 0, true};
-    reference_ = reference_ ? passed_behind(std::move(present), *reference_, search_behind_m_) : std::move(present);
+    if (reference_) present = passed_behind(std::move(present), *reference_, search_behind_m_);
+    reference_ = std::move(present);
   }
   if (reference_) reference_->furthest_m = std::max(reference_->furthest_m, std::abs(reference_->foot_m));
 }

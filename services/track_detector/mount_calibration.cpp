@@ -61,6 +61,7 @@ geometry::CameraPose median_pose(const std::vector<TrackObservation>& observatio
   geometry::CameraPose middle;
   for (const auto member : kMembers) {
     std::vector<double> values;
+    values.reserve(observations.size());
     for (const auto& o : observations) values.push_back(o.shape.camera.*member);
     middle.*member = median(values);
     for (auto& value : values) value = std::abs(value - middle.*member);
@@ -180,6 +181,7 @@ core::Result<MountCalibration> MountCalibrator::solve() const {
   result.mount.roll_rad = roll_rad_;
   add_lens(result);
   std::vector<double> residuals;
+  residuals.reserve(seen.size());
   for (const auto& o : seen) residuals.push_back(o.residual_px);
   result.residual_px = median(residuals);
   return result;

@@ -21,13 +21,13 @@ inline sockaddr_in loopback(int port) {
   return address;
 }
 
-/// Binds to a port that nobody has and returns it.
+/// Binds to a port that nobody has and returns it; -1 = none.
 inline int bind_to_loopback(int socket_number) {
   auto address = loopback(0);
   socklen_t length = sizeof address;
-  bind(socket_number, reinterpret_cast<sockaddr*>(&address), length);
-  getsockname(socket_number, reinterpret_cast<sockaddr*>(&address), &length);
-  return ntohs(address.sin_port);
+  const bool bound = bind(socket_number, reinterpret_cast<sockaddr*>(&address), length) == 0 &&
+                     getsockname(socket_number, reinterpret_cast<sockaddr*>(&address), &length) == 0;
+  return bound ? ntohs(address.sin_port) : -1;
 }
 
 inline bool connect_to_loopback(int socket_number, int port) {

@@ -62,6 +62,7 @@ struct BoxedTrack {
 
 std::vector<BoxedTrack> boxed(const std::vector<ImportedTrack>& tracks) {
   std::vector<BoxedTrack> out;
+  out.reserve(tracks.size());
   for (const ImportedTrack& track : tracks) out.push_back({&track, box_of(track.alignment)});
   return out;
 }

@@ -52,7 +52,8 @@ class ContainerTrain : public Images, public ::testing::WithParamInterface<const
         {TwoHosts::coach, {"railfix/tpr-publisher:test"}}};
     for (const auto& [host, images] : all) {
       auto& engine = engines_[host];
-      engine = hosts_.on(host, [&] { return std::make_unique<DockerEngine>(folder_ / kNames[host] / "docker"); });
+      engine =
+          hosts_.on(host, [&, at = host] { return std::make_unique<DockerEngine>(folder_ / kNames[at] / "docker"); });
       if (!engine->answers())
         GTEST_SKIP() << "skipped: dockerd does not work here: " << slurp(folder_ / kNames[host] / "docker" / "log");
       for (const auto& image : images) {

@@ -53,7 +53,7 @@ TEST_F(TprService, AStateOfAnotherMapIsNoPlace) {
   ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
   ASSERT_TRUE(run_until([&] { return reports_.size() == 1; }, [&] { write_state(450, 0, 20, 9000); }));
   EXPECT_EQ(reports_[0].nid_lrbg(), etcs::kUnknownBaliseGroup);
-  ASSERT_TRUE(run_until([&] { return reason() != ""; }, [&] { write_state(450, 0, 20, 9000); }));
+  ASSERT_TRUE(run_until([&] { return !reason().empty(); }, [&] { write_state(450, 0, 20, 9000); }));
   EXPECT_THAT(reason(), HasSubstr("of another map"));
   ASSERT_TRUE(run_until([&] { return reports_.size() == 2; }, [&] { write_state(450, 0, 20, 450); }));
   EXPECT_EQ(reports_[1].nid_lrbg(), tpr_publisher::testing::kB);

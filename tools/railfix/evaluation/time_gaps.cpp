@@ -9,6 +9,7 @@ namespace railfix::evaluation {
 
 int64_t longest_step_ns(const std::vector<int64_t>& stamps_ns) {
   std::vector<double> steps;
+  steps.reserve(stamps_ns.size());
   for (size_t i = 1; i < stamps_ns.size(); ++i) steps.push_back(static_cast<double>(stamps_ns[i] - stamps_ns[i - 1]));
   if (steps.empty()) return core::kNsPerSecond;
   return std::max(core::kNsPerSecond, static_cast<int64_t>(3 * summarise(steps).p50));

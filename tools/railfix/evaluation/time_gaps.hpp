@@ -21,6 +21,7 @@ TimeGaps gaps_in(const std::vector<int64_t>& stamps_ns);
 template <class Row>
 std::vector<int64_t> stamps_of(const std::vector<Row>& rows) {
   std::vector<int64_t> stamps_ns;
+  stamps_ns.reserve(rows.size());
   for (const Row& row : rows) stamps_ns.push_back(row.stamp_ns);
   return stamps_ns;
 }
