@@ -39,6 +39,7 @@ std::vector<ServiceResult> judge_services(const std::vector<StatusRow>& rows) {
   for (const auto& [name, its] : by_service) {
     const auto of = [&its = its](double StatusRow::*field) {
       std::vector<double> values;
+      values.reserve(its.size());
       for (const StatusRow* row : its) values.push_back(row->*field);
       return summarise(std::move(values));
     };

@@ -80,7 +80,7 @@ void Truth::set_visibility(const std::vector<dataset::TruthVisibility>& rows) {
 
 Truth::Truth(std::vector<TruthRow> rows, std::optional<std::vector<dataset::TruthLandmark>> landmarks,
              std::optional<dataset::CameraCalibration> calibration)
-    : rows_(std::move(rows)), landmarks_(std::move(landmarks)), calibration_(std::move(calibration)) {
+    : rows_(std::move(rows)), landmarks_(std::move(landmarks)), calibration_(calibration) {
   longest_step_ns_ = longest_step_ns(stamps_of(rows_));
   for (const TruthRow& row : rows_) {
     if (!std::isfinite(row.curvature_per_m)) continue;

@@ -60,6 +60,7 @@ std::vector<Thing> things_of(const track::Map& map, const std::vector<SurveySigh
     }
   }
   std::vector<Thing> out;
+  out.reserve(known.size());
   for (auto& [mark, thing] : known) out.push_back(std::move(thing));
   std::sort(rest.begin(), rest.end(), [&](size_t a, size_t b) {
     const auto key = [&](size_t i) {
@@ -189,6 +190,7 @@ void move_group(const SurveyedLandmark& reference, track::Map& map) {
 Survey survey_landmarks(const track::Map& map, const std::vector<SurveySighting>& sightings,
                         const SurveyOptions& options) {
   std::vector<double> places;
+  places.reserve(sightings.size());
   for (const auto& sighting : sightings) places.push_back(sighting.offset_m);
   for (int round = 1;; ++round) {
     Survey out;
