@@ -149,6 +149,11 @@ bool Estimator::measures(Source source) const {
   return used_within(source, kAtWorkS);
 }
 
+bool Estimator::disputes(std::span<const Source> sources, std::optional<Source> but_for) const {
+  return std::ranges::any_of(
+      sources, [&](Source source) { return source != but_for && watch(source).isolated_without_proof(); });
+}
+
 int Estimator::sensors_at_work() const {
   return static_cast<int>(std::ranges::count_if(kMotionSources, [&](Source source) { return measures(source); }));
 }

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/repeated.hpp"
@@ -112,6 +113,8 @@ class Estimator {
   [[nodiscard]] uint32_t isolated() const;
   /// It measured in the last moments and was believed.
   [[nodiscard]] bool measures(Source source) const;
+  /// One of these sources is isolated though nothing proves that it is the wrong one.
+  [[nodiscard]] bool disputes(std::span<const Source> sources, std::optional<Source> but_for = {}) const;
   [[nodiscard]] bool has_ever_measured(Source source) const { return watch(source).used_ns != 0; }
   /// So many motion sensors measured in the last moments and were believed.
   [[nodiscard]] int sensors_at_work() const;

@@ -102,13 +102,12 @@ void Estimator::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
     felt_ = {};
     return;
   }
-  if (!alone) {
+  if (alone) {
+    felt_.add({dt_s, accel_mps2, sigma_mps2, filter_.value(StateIndex::accel_bias),
+               filter_.sigma(StateIndex::accel_bias), filter_.speed_mps(), filter_.sigma(StateIndex::speed)});
+  } else {
     felt_.pause();
-    unwatched_.felt.add(felt_.faster_mps() * dt_s);
-    return;
   }
-  felt_.add({dt_s, accel_mps2, sigma_mps2, filter_.value(StateIndex::accel_bias), filter_.sigma(StateIndex::accel_bias),
-             filter_.speed_mps(), filter_.sigma(StateIndex::speed)});
   unwatched_.felt.add(felt_.faster_mps() * dt_s);
 }
 

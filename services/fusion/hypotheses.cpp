@@ -134,9 +134,7 @@ Hypotheses::Doubter Hypotheses::without_one(const FixInput& fix, Estimator befor
   doubter.surprising = doubter.of_shape && main_.fix_unexpected();
   doubter.confirmed_by = doubter.estimator.landmarks_agreed();
   // A false fix beside a sensor that is wrong settles nothing of what the rivals held.
-  const bool disputed = std::ranges::any_of(
-      kMotionSources, [&](Source source) { return doubter.estimator.watch(source).isolated_without_proof(); });
-  if (disputed) doubter.estimator.doubt_place(most);
+  if (doubter.estimator.disputes(kMotionSources)) doubter.estimator.doubt_place(most);
   doubter.against = main_.fix_corrected() ? kFixesOfAClaim : 1;
   return doubter;
 }

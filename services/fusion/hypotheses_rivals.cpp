@@ -169,9 +169,7 @@ bool Hypotheses::main_is_sound_without(Source source) const {
 // Two sensors agree in it, of which the main one has left one out without proof: should it begin again, nobody would
 // speak for that sensor.
 bool Hypotheses::stands_for_another(const Rival& rival) const {
-  return rival.proven_since_ns != 0 && std::ranges::any_of(kMotionSources, [&](Source source) {
-           return source != rival.without && main_.watch(source).isolated_without_proof();
-         });
+  return rival.proven_since_ns != 0 && main_.disputes(kMotionSources, rival.without);
 }
 
 // What it had said before stays.
@@ -197,9 +195,7 @@ void Hypotheses::extrapolate(Rival& rival, int64_t now_ns) {
 
 // Of two odometers the main one has isolated, without proof, the one that the rival believes.
 bool Hypotheses::is_in_dispute(const Rival& rival) const {
-  return std::ranges::any_of(kOdometers, [&](Source odometer) {
-    return odometer != rival.without && main_.watch(odometer).isolated_without_proof();
-  });
+  return main_.disputes(kOdometers, rival.without);
 }
 
 Sides Hypotheses::beyond(const Interval& mine, const Interval& its) {

@@ -207,13 +207,10 @@ TrackObservation find_rails_anywhere(const geometry::Intrinsics& camera, const c
 
 void MountCalibrator::add_sigmas(const std::vector<TrackObservation>& seen, const geometry::CameraPose& spread,
                                  MountCalibration& result) const {
-  for (const auto member : kMembers) {
+  for (int k = 0; const auto member : kMembers) {
+    ++k;  // of the covariance, which begins with roll
     std::vector<double> own;
     std::vector<double> values;
-    const int k = member == &geometry::CameraPose::pitch_rad   ? 1
-                  : member == &geometry::CameraPose::yaw_rad   ? 2
-                  : member == &geometry::CameraPose::lateral_m ? 3
-                                                               : 4;
     for (const auto& o : seen) {
       own.push_back(std::sqrt(std::max(0.0, o.covariance(k, k))));
       values.push_back(o.shape.camera.*member);

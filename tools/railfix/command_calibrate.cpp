@@ -82,11 +82,10 @@ Lens lens_of(const MountArguments& arguments, const cv::Size& size) {
     }
     return found;
   }
-  const auto own = std::filesystem::is_directory(arguments.pictures)
+  const auto own = arguments.focal_px <= 0 && std::filesystem::is_directory(arguments.pictures)
                        ? core::value_or_throw(dataset::find_calibration(arguments.pictures))
                        : std::nullopt;
-  const bool fits = own && own->intrinsics.width_px == size.width && own->intrinsics.height_px == size.height;
-  if (fits && arguments.focal_px <= 0) {
+  if (own && own->intrinsics.width_px == size.width && own->intrinsics.height_px == size.height) {
     calibration.intrinsics = own->intrinsics;
     calibration.intrinsics_sigma = own->intrinsics_sigma;
     found.remark = "The lens is that of " + arguments.pictures + " (sensor.yaml).";

@@ -63,6 +63,27 @@ void refuse_another_train(const TrainOptions& options, const Manifest& manifest)
   if (const auto why = runs_another_train(options.root, manifest)) throw core::BadInput(*why);
 }
 
+nlohmann::ordered_json status_json(const PlannedService& service, const RunningService& process,
+                                   const service::HealthAnswer& health) {
+  return {{"service", service.name},
+          {"release", service.release},
+          {"generation", service.generation},
+          {"standby", service.standby},
+          {"pid", process.pid},
+          {"restarts", process.restarts},
+          {"healthy", health.works()},
+          {"stands_by", health.stands_by},
+          {"text", health.text}};
+}
+
+std::string status_row(const PlannedService& service, const RunningService& process,
+                       const service::HealthAnswer& health) {
+  char row[256];
+  std::snprintf(row, sizeof(row), "%-15s %-10s %10d %8lld %8d  ", service.name.c_str(), service.release.c_str(),
+                service.generation, static_cast<long long>(process.pid), process.restarts);
+  return row + health.text + standby_text(service, health) + "\n";
+}
+
 int say_status(const TrainOptions& options) {
   const HostFolder folder(options.root);
   const auto plan = plan_here(options);
@@ -86,19 +107,8 @@ int say_status(const TrainOptions& options) {
     healthy = healthy && health.works();
     answers[service.name] = health;
     page += health.serves;
-    json["services"].push_back({{"service", service.name},
-                                {"release", service.release},
-                                {"generation", service.generation},
-                                {"standby", service.standby},
-                                {"pid", process.pid},
-                                {"restarts", process.restarts},
-                                {"healthy", health.works()},
-                                {"stands_by", health.stands_by},
-                                {"text", health.text}});
-    char line[256];
-    std::snprintf(line, sizeof(line), "%-15s %-10s %10d %8lld %8d  ", service.name.c_str(), service.release.c_str(),
-                  service.generation, static_cast<long long>(process.pid), process.restarts);
-    table += line + health.text + standby_text(service, health) + "\n";
+    json["services"].push_back(status_json(service, process, health));
+    table += status_row(service, process, health);
   }
   if (!page.empty()) json["page"] = page;
   const auto again = "railfix train up " + plan.train() + at_root(options.root);

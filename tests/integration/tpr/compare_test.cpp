@@ -65,6 +65,17 @@ class TprCompareFiles : public ::testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return test::run_program(arguments, kPatienceS);
   }
+  /// 20 reports of a train that runs away from A, each as often as told.
+  template <class Change>
+  void write_reports(const std::string& name, const Change& change, int times = 1) const {
+    std::ofstream out(file(name));
+    out << "stamp_ns,hex\n";
+    for (int i = 0; i < 20; ++i) {
+      auto report = beyond(tpr_publisher::testing::kA, 400 + 20 * i, 10);
+      change(report);
+      for (int n = 0; n < times; ++n) out << i * core::kNsPerSecond << ',' << hex_of(report) << '\n';
+    }
+  }
 
  private:
   std::filesystem::path folder_ =
@@ -205,15 +216,14 @@ TEST_F(TprCompareFiles, GroupsThatTheMapDoesNotHaveAreCounted) {
 TEST_F(TprCompareFiles, WhatContradictsOrComesTwiceIsTold) {
   const auto write = [&](const char* name, uint32_t q_dirlrbg, bool placed, int times = 1,
                          uint32_t q_dirtrain = etcs::kNominal) {
-    std::ofstream out(file(name));
-    out << "stamp_ns,hex\n";
-    for (int i = 0; i < 20; ++i) {
-      auto report = beyond(tpr_publisher::testing::kA, 400 + 20 * i, 10);
-      report.q_dirlrbg = q_dirlrbg;
-      report.q_dirtrain = q_dirtrain;
-      if (!placed) report.d_lrbg = etcs::kUnknownDistance;
-      for (int n = 0; n < times; ++n) out << i * core::kNsPerSecond << ',' << hex_of(report) << '\n';
-    }
+    write_reports(
+        name,
+        [&](auto& report) {
+          report.q_dirlrbg = q_dirlrbg;
+          report.q_dirtrain = q_dirtrain;
+          if (!placed) report.d_lrbg = etcs::kUnknownDistance;
+        },
+        times);
   };
   write("ours.csv", etcs::kNominal, true);
   write("certified.csv", etcs::kReverse, true, 2);
@@ -237,14 +247,10 @@ TEST_F(TprCompareFiles, WhatContradictsOrComesTwiceIsTold) {
 
 TEST_F(TprCompareFiles, ASpeedThatIsOffAndAnotherModeAreTold) {
   const auto write = [&](const char* name, uint32_t v_train, uint32_t m_mode) {
-    std::ofstream out(file(name));
-    out << "stamp_ns,hex\n";
-    for (int i = 0; i < 20; ++i) {
-      auto report = beyond(tpr_publisher::testing::kA, 400 + 20 * i, 10);
+    write_reports(name, [&](auto& report) {
       report.v_train = v_train;
       report.m_mode = m_mode;
-      out << i * core::kNsPerSecond << ',' << hex_of(report) << '\n';
-    }
+    });
   };
   write("ours.csv", 18, 0);
   write("certified.csv", 14, 2);

@@ -31,6 +31,13 @@ class Trigger : public ::testing::Test {
     return parameters;
   }
   void ask(const etcs::ReportParameters& parameters) { trigger.set_parameters(parameters); }
+  void ask_every_50_m() {
+    auto wanted = parameters();
+    wanted.t_cycloc = etcs::kNoCycleTime;
+    wanted.q_scale = 2;
+    wanted.d_cycloc = 5;
+    ask(wanted);
+  }
 
   ReportTrigger trigger{parameters(), 100};
   Moment moment;
@@ -62,11 +69,7 @@ TEST_F(Trigger, AClockThatWasSetBackSilencesNobody) {
 }
 
 TEST_F(Trigger, ReportsEveryDCyclocMetresEitherWay) {
-  auto wanted = parameters();
-  wanted.t_cycloc = etcs::kNoCycleTime;
-  wanted.q_scale = 2;
-  wanted.d_cycloc = 5;  // 50 m
-  ask(wanted);
+  ask_every_50_m();
   step();
   run(100, 49);
   EXPECT_EQ(step(), std::nullopt);
@@ -78,11 +81,7 @@ TEST_F(Trigger, ReportsEveryDCyclocMetresEitherWay) {
 
 // A train that is moved to and fro, and one that stands and whose place trembles.
 TEST_F(Trigger, DCyclocCountsTheWayThatWasRun) {
-  auto wanted = parameters();
-  wanted.t_cycloc = etcs::kNoCycleTime;
-  wanted.q_scale = 2;
-  wanted.d_cycloc = 5;  // 50 m
-  ask(wanted);
+  ask_every_50_m();
   step();
   int reports = 0;
   for (int i = 0; i < 300; ++i) {

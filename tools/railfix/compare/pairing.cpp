@@ -16,10 +16,16 @@ constexpr double kSpeedRoundingMps = 2.5 / 3.6;
 constexpr double kSamePlaceM = 1;
 constexpr double kLargestAccelerationMps2 = 1.5;  // for reports that do not say which way they run
 
+/// Where a time lies between two reports; 0 where they are of one time.
+double share_of_gap(const PlacedReport& a, const PlacedReport& b, int64_t stamp_ns) {
+  const double gap_s = core::seconds(b.stamp_ns - a.stamp_ns);
+  return gap_s > 0 ? core::seconds(stamp_ns - a.stamp_ns) / gap_s : 0;
+}
+
 /// Cubic Hermite between two reports; `share` of the way in time.
 PlacedReport carried(const PlacedReport& a, const PlacedReport& b, int64_t stamp_ns, double& doubt_m) {
   const double gap_s = core::seconds(b.stamp_ns - a.stamp_ns);
-  const double share = gap_s > 0 ? core::seconds(stamp_ns - a.stamp_ns) / gap_s : 0;
+  const double share = share_of_gap(a, b, stamp_ns);
   const double rest = 1 - share;
   PlacedReport at = share < 1 ? a : b;
   at.stamp_ns = stamp_ns;
@@ -53,8 +59,7 @@ void compare_speeds(const PlacedReport& last, const PlacedReport& next, Pair& pa
   const double speed = speed_kmh(pair.certified.fields);
   const auto [low, high] = std::minmax({speed_kmh(last.fields), speed_kmh(next.fields)});
   pair.speed_apart_kmh = std::max({0.0, low - speed, speed - high});
-  const double gap_s = core::seconds(next.stamp_ns - last.stamp_ns);
-  const double share = gap_s > 0 ? core::seconds(pair.stamp_ns - last.stamp_ns) / gap_s : 0;
+  const double share = share_of_gap(last, next, pair.stamp_ns);
   pair.faster_kmh = speed_kmh(last.fields) * (1 - share) + speed_kmh(next.fields) * share - speed;
 }
 

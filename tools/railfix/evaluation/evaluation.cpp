@@ -145,7 +145,7 @@ Evaluation evaluate(const Truth& truth, const RunTables& run) {
   result.empty = run.empty;
   result.out_of_order = run.out_of_order;
   for (const auto& [name, span] : run.spans)
-    if (span.every_step && span.gaps.count > 0) result.gaps[name] = span.gaps;
+    if (span.gaps.count > 0) result.gaps[name] = span.gaps;
   if (run.odometry) result.odometry = judge_odometry(truth, *run.odometry);
   if (run.states) result.position = judge_position(truth, *run.states);
   if (run.views) result.views = judge_views(truth, *run.views);

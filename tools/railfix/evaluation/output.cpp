@@ -250,10 +250,6 @@ ordered_json or_null(const std::optional<T>& part, Write write) {
   return part ? write(*part) : ordered_json();
 }
 
-}  // namespace
-
-namespace {
-
 /// What the truth cannot tell.
 void print_truth(std::ostream& out, const Evaluation& evaluation) {
   constexpr double kWorthSayingM = 0.01;

@@ -192,7 +192,8 @@ Status read_if_there(const fs::path& folder, const std::string& name, std::optio
   if constexpr (requires(Row row) { row.stamp_ns; }) {
     if (const size_t older = put_in_order(*rows)) run.out_of_order[name] = older;
     if (!rows->empty())
-      run.spans[name] = {rows->front().stamp_ns, rows->back().stamp_ns, kEveryStep<Row>, gaps_in(stamps_of(*rows))};
+      run.spans[name] = {rows->front().stamp_ns, rows->back().stamp_ns, kEveryStep<Row>,
+                         kEveryStep<Row> ? gaps_in(stamps_of(*rows)) : TimeGaps{}};
   }
   if constexpr (kEveryStep<Row>) {
     if (status.ok() && rows->empty()) {

@@ -6,6 +6,7 @@
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
+#include <ranges>
 
 #include "core/fnv.hpp"
 #include "core/whole_file.hpp"
@@ -23,10 +24,9 @@ RunContent::RunContent(const std::string& text) : table_(text.substr(0, kTableDi
   for (size_t i = kTableDigits; i + kDigits <= text.size(); i += kDigits) {
     uint32_t number = 0;
     std::from_chars(text.data() + i, text.data() + i + kDigits, number, 16);
-    numbers_.push_back(number);
+    numbers_.insert(number);
   }
-  std::ranges::sort(numbers_);
-  if (numbers_.size() >= kKept) complete_to_ = numbers_.back();
+  if (numbers_.size() >= kKept) complete_to_ = *numbers_.rbegin();
 }
 
 core::Status RunContent::add_table(const std::filesystem::path& file) {
@@ -47,16 +47,14 @@ void RunContent::add(int64_t stamp_ns, track::LandmarkKind kind, double ahead_m)
   core::Fnv fnv;
   fnv.add(std::to_string(stamp_ns) + "," + track::to_string(kind) + "," +
           std::to_string(std::llround(kMmPerM * ahead_m)));
-  const auto number = static_cast<uint32_t>(fnv.value() ^ (fnv.value() >> 32U));
-  const auto at = std::ranges::lower_bound(numbers_, number);
-  if (at == numbers_.end() || *at != number) numbers_.insert(at, number);
+  numbers_.insert(static_cast<uint32_t>(fnv.value() ^ (fnv.value() >> 32U)));
 }
 
 std::string RunContent::text() const {
   std::string out = table_;
-  for (size_t i = 0; i < std::min(numbers_.size(), kKept); ++i) {
+  for (const uint32_t number : numbers_ | std::views::take(kKept)) {
     std::array<char, kDigits + 1> digits{};
-    std::snprintf(digits.data(), digits.size(), "%08" PRIx32, numbers_[i]);
+    std::snprintf(digits.data(), digits.size(), "%08" PRIx32, number);
     out += digits.data();
   }
   return out;
@@ -65,8 +63,8 @@ std::string RunContent::text() const {
 bool RunContent::same_run(const RunContent& other) const {
   if (table_ == other.table_) return true;
   const uint32_t to = std::min(complete_to_, other.complete_to_);
-  const auto within = [to](const std::vector<uint32_t>& numbers) {
-    return std::vector<uint32_t>(numbers.begin(), std::ranges::upper_bound(numbers, to));
+  const auto within = [to](const std::set<uint32_t>& numbers) {
+    return std::vector<uint32_t>(numbers.begin(), numbers.upper_bound(to));
   };
   const auto mine = within(numbers_);
   const auto others = within(other.numbers_);

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <set>
 #include <string>
-#include <vector>
 
 #include "core/result.hpp"
 #include "track/map.hpp"
@@ -30,7 +30,7 @@ class RunContent {
 
  private:
   std::string table_;
-  std::vector<uint32_t> numbers_;  // sorted
+  std::set<uint32_t> numbers_;
   uint32_t complete_to_ = UINT32_MAX;
 };
 

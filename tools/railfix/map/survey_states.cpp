@@ -7,6 +7,7 @@
 #include "core/csv_table.hpp"
 #include "core/time.hpp"
 #include "core/train_limits.hpp"
+#include "evaluation/time_gaps.hpp"
 #include "fusion/fusion_parameters.hpp"
 #include "map/survey_stamps.hpp"
 #include "track/declared.hpp"
@@ -118,14 +119,7 @@ core::Result<RunStates> RunStates::read(const std::shared_ptr<const track::Map>&
 
 /// The ways that the speeds give, trapezoids. Over rows without a speed, or far apart, nobody knows it.
 void RunStates::find_ways() {
-  constexpr int64_t kLongestStepNs = 1'000'000'000;
-  constexpr int64_t kUsualSteps = 3;
-  if (states_.size() < 2) return;
-  std::vector<int64_t> steps;
-  for (size_t i = 1; i < states_.size(); ++i) steps.push_back(states_[i].stamp_ns - states_[i - 1].stamp_ns);
-  const auto middle = steps.begin() + static_cast<ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  longest_step_ns_ = std::max(kLongestStepNs, kUsualSteps * *middle);
+  longest_step_ns_ = evaluation::longest_step_ns(evaluation::stamps_of(states_));
   const RunState* last = nullptr;  // with a speed
   for (RunState& state : states_) {
     if (last != nullptr) {

@@ -139,15 +139,7 @@ core::Result<std::vector<Source>> open_all(const std::vector<fs::path>& files) {
 
 using LossCounts = std::map<std::string, uint64_t>;
 
-/// Parts of one recording, which all say what it is, have its losses in common.
-LossCounts added_up(const std::vector<std::pair<std::string, LossCounts>>& losses_of) {
-  std::map<std::string, LossCounts> by_recording;
-  for (const auto& [recording, losses] : losses_of) {
-    for (const auto& [what, count] : losses) {
-      auto& most = by_recording[recording][what];
-      most = std::max(most, count);
-    }
-  }
+LossCounts added_up(const std::map<std::string, LossCounts>& by_recording) {
   LossCounts sum;
   for (const auto& [recording, losses] : by_recording) {
     for (const auto& [what, count] : losses) sum[what] += count;
@@ -161,11 +153,12 @@ std::string recording_of(const Source& source) {
   return started.empty() ? source.reader->file().string() : value_of(*source.reader, "train_id") + " " + started;
 }
 
-/// Losses are counted on within a recording: its last word is its sum, and the sums add up.
+/// Losses are counted on within a recording: its last word is its sum, and the sums add up. Parts of one recording have
+/// them in common.
 core::Status write_metadata(Copier& copier, const std::vector<Source>& sources) {
   std::vector<mcap::Metadata> written;
   mcap::Metadata merged{"railfix_merge", {}};
-  std::vector<std::pair<std::string, LossCounts>> losses_of;
+  std::map<std::string, LossCounts> by_recording;
   for (const auto& source : sources) {
     merged.entries["file_" + std::to_string(merged.entries.size() + 1)] = source.reader->file().filename().string();
     const mcap::Metadata* last_losses = nullptr;
@@ -177,11 +170,13 @@ core::Status write_metadata(Copier& copier, const std::vector<Source>& sources) 
       }
     }
     if (last_losses == nullptr) continue;
-    auto& losses = losses_of.emplace_back(recording_of(source), LossCounts{}).second;
-    for (const auto& [what, count] : last_losses->entries) losses[what] = std::strtoull(count.c_str(), nullptr, 10);
+    for (const auto& [what, count] : last_losses->entries) {
+      uint64_t& most = by_recording[recording_of(source)][what];
+      most = std::max<uint64_t>(most, std::strtoull(count.c_str(), nullptr, 10));
+    }
   }
   written.push_back(merged);
-  const auto losses = added_up(losses_of);
+  const auto losses = added_up(by_recording);
   if (!losses.empty()) {
     written.push_back({kLosses, {}});
     for (const auto& [what, count] : losses) written.back().entries[what] = std::to_string(count);

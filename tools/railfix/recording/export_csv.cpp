@@ -89,14 +89,9 @@ class Tables {
   }
   /// A version of the topic's type that has other columns has a table of its own: TOPIC, TOPIC-2, ...
   Table& of(const std::string& topic, const cdr::Structure& type) {
-    const auto header = header_of(type);
-    auto& versions = versions_[topic];
-    const auto found = std::ranges::find(versions, header);
-    const auto number = found - versions.begin() + 1;
-    if (found == versions.end()) versions.push_back(header);
-    const auto [place, is_new] = tables_.try_emplace(number == 1 ? topic : topic + "-" + std::to_string(number));
-    if (is_new) place->second = std::make_unique<Table>(draft_of(place->first), header);
-    return *place->second;
+    auto*& table = table_of_[{topic, &type}];
+    if (table == nullptr) table = &of(topic, header_of(type));
+    return *table;
   }
   core::Status keep() {
     for (const auto& [name, table] : tables_) {
@@ -118,6 +113,15 @@ class Tables {
   [[nodiscard]] size_t size() const { return tables_.size(); }
 
  private:
+  Table& of(const std::string& topic, const std::string& header) {
+    auto& versions = versions_[topic];
+    const auto found = std::ranges::find(versions, header);
+    const auto number = found - versions.begin() + 1;
+    if (found == versions.end()) versions.push_back(header);
+    const auto [place, is_new] = tables_.try_emplace(number == 1 ? topic : topic + "-" + std::to_string(number));
+    if (is_new) place->second = std::make_unique<Table>(draft_of(place->first), header);
+    return *place->second;
+  }
   [[nodiscard]] fs::path file_of(std::string name) const {
     std::ranges::replace(name, '/', '_');
     return folder_ / (name + ".csv");
@@ -129,6 +133,7 @@ class Tables {
   bool kept_ = false;
   std::map<std::string, std::unique_ptr<Table>> tables_;
   std::map<std::string, std::vector<std::string>> versions_;  // headers, by topic
+  std::map<std::pair<std::string, const cdr::Structure*>, Table*> table_of_;
 };
 
 }  // namespace
