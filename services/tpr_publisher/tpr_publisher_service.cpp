@@ -192,7 +192,7 @@ void TprPublisherService::say_what_is_assumed() {
   if (ticks_unheard_ > kTicksUnheard || ++ticks_unheard_ <= kTicksUnheard) return;
   if (publisher_.mode_assumed())
     context_.log().warn(
-        "Mode {} and level {} of the reports are those of the keys m_mode and m_level: nobody has sent "
+        "M_MODE {} and M_LEVEL {} of the reports are those of the keys m_mode and m_level: nobody has sent "
         "onboard_status. Train integrity is not known.",
         settings_.report.m_mode, settings_.report.m_level);
 }
