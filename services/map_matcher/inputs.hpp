@@ -37,6 +37,7 @@ struct StateInput {
   bool usable = true;       // otherwise its place is no position
   bool standstill = false;
   bool gnss_agrees = false;
+  bool camera_agrees = true;  // otherwise the way is not what it says, and its pictures may be old ones
 };
 
 [[nodiscard]] bool has_sense(const Sighting& sighting);

@@ -19,7 +19,10 @@ constexpr double kOpenTrackEveryM = 2.0;  // ... or, while it is not known, this
 constexpr double kCountM = 20.0;
 constexpr double kCreepMps = 0.3;     // slower than that the sign of a speed may be its noise
 constexpr double kWorthSaying = 0.5;  // probability of the track beside
-constexpr double kRateShare = 0.75;   // of the curvature's sigma comes from its unknown rate
+constexpr double kHardBrakeMps2 = 1.5;
+constexpr double kOtherWayM = 0.1;      // the camera's way is another than fusion's from this on ...
+constexpr double kOtherWayShare = 0.2;  // ... and this share of it
+constexpr double kRateShare = 0.75;     // of the curvature's sigma comes from its unknown rate
 
 // What was nearest a while ago, from where the train is at that stamp: search and chooser know no earlier places.
 Sighting sighted_at(int64_t stamp_ns, double speed_mps, Sighting sighting) {
@@ -177,8 +180,30 @@ std::optional<Prior> MapMatcher::prior_at(int64_t stamp_ns) const {
   return followed_->prior_at(stamp_ns, state_->placed);
 }
 
-PlaceFixes MapMatcher::add(const StepInput& step) {
+// Fusion knows from the other sensors whether the camera measures: a picture that stands still says that the train
+// does.
+bool MapMatcher::trusts_camera() const {
+  return !state_ || state_->camera_agrees;
+}
+
+// Fusion takes a moment to tell, in which the way would be lost.
+bool MapMatcher::trusts(const StepInput& step) const {
+  if (!trusts_camera()) return false;
+  if (!state_ || !step.measured) return true;
+  const double step_s = core::seconds(step.stamp_ns - step.reference_stamp_ns);
+  const double since_s = std::abs(core::seconds(step.stamp_ns - state_->placed.stamp_ns));
+  if (since_s > FollowedPath::kOldStateS) return true;
+  const double expected_m = state_->placed.speed_mps * step_s;
+  const double faster_mps = kHardBrakeMps2 * (since_s + 0.5 * step_s);
+  const double most_m = kOtherWayM + kOtherWayShare * std::abs(expected_m) + faster_mps * step_s;
+  const bool is_other = std::abs(step.step_m * state_->visual_scale - expected_m) > most_m;  // no speed tells nothing
+  return !is_other;
+}
+
+PlaceFixes MapMatcher::add(const StepInput& said) {
   PlaceFixes fixes;
+  StepInput step = said;
+  step.measured = said.measured && trusts(said);
   chain_.add(step);
   if (map_ && parameters_.locate) search(step, fixes);
   if (chooser_) follow_turning(step, fixes);
@@ -332,7 +357,7 @@ void MapMatcher::say_track(PlaceFixes& fixes) {
 void MapMatcher::add(const ViewInput& view) {
   rails_seen_ns_ = view.stamp_ns;
   const double sigma_per_m = std::sqrt(view.variance);
-  if (chooser_ && prior_at(view.stamp_ns)) chooser_->see(view.curvature_per_m, sigma_per_m);
+  if (chooser_ && trusts_camera() && prior_at(view.stamp_ns)) chooser_->see(view.curvature_per_m, sigma_per_m);
   if (!curvature_ || !parameters_.use_curvature || !step_ || !step_->measured) return;
   const double dt_s = core::seconds(view.stamp_ns - step_->stamp_ns);
   if (std::abs(dt_s) > FollowedPath::kOldStateS || std::abs(step_->speed_mps) < parameters_.least_speed_mps) return;

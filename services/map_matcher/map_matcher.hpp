@@ -42,7 +42,7 @@ class MapMatcher {
   MapMatcher(const MapMatcherParameters& parameters, std::shared_ptr<const track::Map> map);
 
   PlaceFixes add(const StateInput& state);
-  PlaceFixes add(const StepInput& step);
+  PlaceFixes add(const StepInput& said);
   PlaceFixes add(const Sighting& sighting);
   PlaceFixes add(const GnssInput& position);
   /// Of rails that are seen.
@@ -74,6 +74,8 @@ class MapMatcher {
   void search(const StepInput& step, PlaceFixes& fixes);
   void search_by(const std::optional<Turn>& turn, int64_t stamp_ns, PlaceFixes& fixes);
   [[nodiscard]] bool has_pictures() const;
+  [[nodiscard]] bool trusts_camera() const;
+  [[nodiscard]] bool trusts(const StepInput& step) const;
   void match_shape(const StepInput& step, PlaceFixes& fixes);
   void match_shape_without_camera(int64_t to_ns, PlaceFixes& fixes);
   void match_shape(int64_t stamp_ns, PlaceFixes& fixes);

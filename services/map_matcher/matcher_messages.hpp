@@ -60,7 +60,8 @@ inline StateInput input_of(const msg::TrainState& m) {
           .track_known = m.track_known() != 0,
           .usable = m.integrity() != msg::INTEGRITY_UNUSABLE,
           .standstill = m.standstill() != 0,
-          .gnss_agrees = (m.sources() & msg::SOURCE_GNSS) != 0};
+          .gnss_agrees = (m.sources() & msg::SOURCE_GNSS) != 0,
+          .camera_agrees = (m.sources() & msg::SOURCE_CAMERA) != 0};
 }
 
 inline uint8_t kind_of(FixKind kind) {

@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
+#include <string>
 
 #include "core/time.hpp"
 #include "unit/map_matcher/fork_map.hpp"
@@ -158,8 +160,12 @@ TEST_F(MapMatcherRide, AStateOfAnotherMapIsNamedAndNothingIsMatchedThere) {
   EXPECT_TRUE(frog().empty());
 }
 
+/// What a camera says that does not measure: nothing, or (frozen: its picture stands still; drifts, and fusion knows
+/// it) something wrong.
+enum class Camera : uint8_t { none, blind, frozen, drifts };
+
 /// A line with a curve of 600 m to the left from 500 m on; the train is 12 m further than fusion thinks.
-class ShapeInTheDark : public testing::TestWithParam<bool> {
+class ShapeInTheDark : public testing::TestWithParam<Camera> {
  protected:
   static std::shared_ptr<const track::Map> line() {
     auto map = std::make_shared<track::Map>();
@@ -174,8 +180,18 @@ class ShapeInTheDark : public testing::TestWithParam<bool> {
     parameters.lag_m = 0;
     return parameters;
   }
-  /// What the shape tells. pictures: there are some, all of them blind.
-  PlaceFixes ride(bool pictures, bool gyro) {
+  static StepInput step(Camera camera, int64_t from_ns, int64_t to_ns) {
+    StepInput step{to_ns, from_ns};
+    step.measured = camera != Camera::blind;
+    if (camera == Camera::drifts) {
+      step.speed_mps = 0.9 * kSpeedMps;
+      step.step_m = step.speed_mps * kPeriodS;
+      step.distance_m = step.speed_mps * core::seconds(to_ns - core::kNsPerSecond);
+    }
+    return step;
+  }
+  /// What the shape tells.
+  PlaceFixes ride(Camera camera, bool gyro) {
     const auto& alignment = map_->edges.front().alignment;
     PlaceFixes fixes;
     for (int i = 1; i * kPeriodS * kSpeedMps < kRideM; ++i) {
@@ -190,12 +206,13 @@ class ShapeInTheDark : public testing::TestWithParam<bool> {
       state.track_probability = 1;
       state.sigma_m = 7;
       state.track_known = true;
+      state.camera_agrees = camera != Camera::drifts;
       const auto pose = alignment.at(at_m - kOffM).pose;
       state.easting_m = pose.easting_m;
       state.northing_m = pose.northing_m;
       auto said = matcher_.add(state);
-      if (pictures) {
-        const auto more = matcher_.add(StepInput{ns(i * kPeriodS), ns((i - 1) * kPeriodS)});
+      if (camera != Camera::none) {
+        const auto more = matcher_.add(step(camera, ns((i - 1) * kPeriodS), ns(i * kPeriodS)));
         said.insert(said.end(), more.begin(), more.end());
       }
       std::ranges::copy_if(said, std::back_inserter(fixes),
@@ -237,8 +254,13 @@ TEST_P(ShapeInTheDark, IsNotToldWithoutAGyro) {
   EXPECT_TRUE(ride(GetParam(), false).empty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Pictures, ShapeInTheDark, testing::Bool(),
-                         [](const auto& one) { return one.param ? "AreBlind" : "AreNone"; });
+std::string name_of(const testing::TestParamInfo<Camera>& one) {
+  static const std::array<std::string, 4> names{"None", "Blind", "Frozen", "Drifts"};
+  return names.at(static_cast<size_t>(one.param));
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, ShapeInTheDark,
+                         testing::Values(Camera::none, Camera::blind, Camera::frozen, Camera::drifts), name_of);
 
 TEST(MapMatcher, WithoutAMapSaysWhy) {
   MapMatcher matcher({}, nullptr);
