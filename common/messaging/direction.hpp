@@ -21,5 +21,14 @@ constexpr uint8_t direction_of(track::Direction direction) {
 inline track::EdgePosition place_of(const msg::TrainState& state) {
   return {state.edge(), state.offset_m(), direction_of(state.direction())};
 }
+inline track::EdgePosition place_of(const msg::PositionFix& fix) {
+  return {fix.edge(), fix.offset_m(), direction_of(fix.direction())};
+}
+
+/// The same on the plane of the sender's map, for track::lies_there.
+template <class Message>
+track::PlanPose pose_of(const Message& message) {
+  return {message.easting_m(), message.northing_m(), message.heading_rad()};
+}
 
 }  // namespace railfix::messaging

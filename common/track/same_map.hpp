@@ -4,20 +4,33 @@
 
 #include <cmath>
 
+#include "core/units.hpp"
 #include "track/map.hpp"
 
 namespace railfix::track {
 
-/// A place that somebody else says, on his map at these coordinates: does it lie there on this map, too? Coordinates
-/// that are not told (0, 0 or no numbers) contradict nothing.
-inline bool lies_there(const Map& map, const EdgePosition& place, double easting_m, double northing_m) {
+/// Where the cab looks at a place: along the edge or against it.
+/// REQUIRES: the edge is on the map.
+inline PlanPose cab_pose(const Map& map, const EdgePosition& place) {
+  const PlanPose along = map.edge(place.edge)->alignment.at(place.offset_m).pose;
+  return place.direction == Direction::reverse ? turned_round(along) : along;
+}
+
+/// A place that somebody else says, where on his map the cab looks along the track so: does it lie there on this map,
+/// too, in that direction? Coordinates that are not told (0, 0 or no numbers) contradict nothing, nor does a heading
+/// that is none.
+inline bool lies_there(const Map& map, const EdgePosition& place, const PlanPose& told) {
   constexpr double kSamePlaceM = 1.0;
+  constexpr double kSameHeadingRad = 0.2;
   const Edge* edge = map.edge(place.edge);
   if (edge == nullptr) return false;
-  const bool told = std::isfinite(easting_m) && std::isfinite(northing_m) && (easting_m != 0 || northing_m != 0);
-  if (!told || !std::isfinite(place.offset_m)) return true;
-  const PlanPose pose = edge->alignment.at(place.offset_m).pose;
-  return std::hypot(pose.easting_m - easting_m, pose.northing_m - northing_m) < kSamePlaceM;
+  const bool is_told =
+      std::isfinite(told.easting_m) && std::isfinite(told.northing_m) && (told.easting_m != 0 || told.northing_m != 0);
+  if (!is_told || !std::isfinite(place.offset_m)) return true;
+  const PlanPose here = cab_pose(map, place);
+  if (std::hypot(here.easting_m - told.easting_m, here.northing_m - told.northing_m) >= kSamePlaceM) return false;
+  if (place.direction == Direction::unknown || !std::isfinite(told.heading_rad)) return true;
+  return std::abs(core::wrap_pi(here.heading_rad - told.heading_rad)) < kSameHeadingRad;
 }
 
 }  // namespace railfix::track

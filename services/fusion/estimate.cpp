@@ -49,6 +49,8 @@ std::string why_given_up(Against because) {
       return ": it was given up, what was sighted fitted the map nowhere near it";
     case Against::turning:
       return ": it was given up, the train turned otherwise than the track there";
+    case Against::map_end:
+      return ": it was given up, the train has run far beyond the end of the mapped track";
     case Against::fusion_before:
       break;
   }

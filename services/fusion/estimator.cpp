@@ -92,9 +92,19 @@ void Estimator::apply(const Event& event, const FixContext& context) {
     place_.track_doubt.move(*place_.path, filter_.path_distance_m());
     const double way_m = standstill_ ? 0 : std::abs(distance_m() - before_m);
     const bool turns_otherwise = place_.track_doubt.turns_otherwise() && !gnss_proven();
-    place_.wrong_place.move(way_m, {turns_otherwise, place_.track_doubt.turns_otherwise_now(), gnss_denies_place()});
+    place_.wrong_place.move(
+        way_m, {turns_otherwise, place_.track_doubt.turns_otherwise_now(), gnss_denies_place(), is_off_map()});
   }
   watch_standstill();
+}
+
+// Wherever in its interval it is.
+bool Estimator::is_off_map() const {
+  const auto& path = *place_.path;
+  const double here_m = filter_.path_distance_m();
+  if (here_m >= path.begin_m() && here_m <= path.end_m()) return false;
+  const auto known = widened(interval());
+  return known.rear_m > path.end_m() || known.front_m < path.begin_m();
 }
 
 bool Estimator::used_within(Source source, double time_s) const {

@@ -310,6 +310,9 @@ class Estimator {
   void confirm_by_curve(bool tells_track);
   /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies_place() const;
+  /// That end of its path.
+  [[nodiscard]] bool may_be_beyond(double end_m) const;
+  [[nodiscard]] bool is_off_map() const;
   void hold_gnss(double foot_m, double sigma_m);
   void use_track(const FixInput& fix);
   void doubt_points_behind();

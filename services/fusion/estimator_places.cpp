@@ -71,6 +71,11 @@ FootOnPath foot_on_path(const track::Path& path, double start_m, double easting_
 
 }  // namespace
 
+bool Estimator::may_be_beyond(double end_m) const {
+  const auto known = widened(interval());
+  return end_m > place_.path->begin_m() ? known.front_m >= end_m : known.rear_m <= end_m;
+}
+
 // Tested as it is; what is new in it beside the fix before is little, because its error lasts.
 void Estimator::use(const GnssInput& sample) {
   auto& gnss = watched(Source::gnss);
@@ -81,9 +86,11 @@ void Estimator::use(const GnssInput& sample) {
   }
   const auto place = foot_on_path(*place_.path, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
   const double once_m = std::hypot(gnss_sigma_m(sample, *parameters_), parameters_->gnss_map_sigma_m);
-  if (place.beyond_m > once_m) return;  // the map ends before: its end is not where the train is
+  // The map ends before: its end is not where the train is, if it may have come there at all.
+  const bool beyond = place.beyond_m > once_m;
+  if (beyond && may_be_beyond(place.distance_m)) return;
   const double foot_m = place.distance_m - parameters_->gnss_antenna_ahead_m;
-  const bool beside = std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
+  const bool beside = beyond || std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
   const bool agrees = !beside && filter_.test_position(foot_m, once_m, parameters_->gate_gnss).used;
   const MeasuredPlace measured{foot_m, kGnssNewShare * once_m, StateIndex::gnss_error, kGnssLastingShare * once_m};
   if (gnss.isolated) {
@@ -298,8 +305,9 @@ void Estimator::accept(const FixInput& fix) {
   // Some curve may fit at a place that nobody has confirmed, though the train turns otherwise than the track there.
   const bool far_off = place_.told_by == ToldBy::start || place_.told_by == ToldBy::gnss;
   const bool by_chance = fix.kind == FixKind::curvature && (far_off || place_.track_doubt.turns_otherwise());
+  const bool searched = fix.kind == FixKind::network || fix.kind == FixKind::gnss;
   if (!by_chance) {
-    place_.track_doubt.seen_here();
+    searched ? place_.track_doubt.found_here() : place_.track_doubt.seen_here();
     place_.turned_way.corrected(fix_offer_.residual);
     compare_turns();
   }

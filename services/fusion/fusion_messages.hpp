@@ -47,13 +47,14 @@ inline void hold_other_places(const msg::PositionFix& m, FixInput& fix) {
 inline FixInput input_of(const msg::PositionFix& m) {
   FixInput fix;
   fix.stamp_ns = m.stamp_ns();
-  fix.edge = m.edge();
-  fix.offset_m = m.offset_m();
+  const auto place = messaging::place_of(m);
+  fix.edge = place.edge;
+  fix.offset_m = place.offset_m;
+  fix.direction = place.direction;
   fix.sigma_m = m.sigma_m();
   fix.probability = m.probability();
   fix.landmark = m.landmark();
   fix.kind = static_cast<FixKind>(m.kind());
-  fix.direction = messaging::direction_of(m.direction());
   fix.sightings_fit = m.sightings_fit() == msg::SIGHTINGS_FIT_HERE      ? SightingsFit::here
                       : m.sightings_fit() == msg::SIGHTINGS_FIT_NOWHERE ? SightingsFit::nowhere
                                                                         : SightingsFit::not_told;
@@ -124,8 +125,7 @@ inline KnownPlace known_place_of(const msg::TrainState& m, bool in_doubt) {
           m.track_probability(),
           m.integrity() != msg::INTEGRITY_OK,
           in_doubt,
-          m.easting_m(),
-          m.northing_m()};
+          messaging::pose_of(m)};
 }
 
 inline const char* topic_of(const Event& event) {

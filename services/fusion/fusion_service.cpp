@@ -114,7 +114,7 @@ void FusionService::hear(const msg::TrainState& state) {
 }
 
 bool FusionService::tell_other_map(const msg::TrainState& state) {
-  if (track::lies_there(*map_, messaging::place_of(state), state.easting_m(), state.northing_m())) return false;
+  if (track::lies_there(*map_, messaging::place_of(state), messaging::pose_of(state))) return false;
   if (!std::exchange(other_map_told_, true)) {
     context_.log().warn(
         "the fusion in charge has another map than fusion.map: its place is not taken over; give both the same file");
@@ -275,8 +275,16 @@ void FusionService::listen(const FusionConfig& config) {
     });
   }
   if (config.use_fixes) {
-    context_.on<msg::PositionFix>(position_fix, [this](const msg::PositionFix& m) { use(input_of(m), 0); });
+    context_.on<msg::PositionFix>(position_fix, [this](const msg::PositionFix& m) { use(m); });
   }
+}
+
+void FusionService::use(const msg::PositionFix& fix) {
+  if (map_ && !track::lies_there(*map_, messaging::place_of(fix), messaging::pose_of(fix))) {
+    leave_out(position_fix.name, "map_matcher has another map than fusion.map: give both services the same file");
+    return;
+  }
+  use(input_of(fix), 0);
 }
 
 void FusionService::use_gnss(const msg::GnssFix& sample) {

@@ -28,6 +28,7 @@ class FusionService {
   void note_left_out(const Event& event, const FusionCounts& before);
   void leave_out(const std::string& topic, const char* why);
   [[nodiscard]] std::string left_out() const;
+  void use(const msg::PositionFix& fix);
   void use_gnss(const msg::GnssFix& sample);
   void keep_time(const msg::DataClock& clock);
   void tick();

@@ -21,7 +21,7 @@ std::optional<FixInput> place_at(const std::shared_ptr<const track::Map>& map, c
   const double age_s = core::seconds(stamp_ns - known.stamp_ns);
   if (std::abs(age_s) > kOldestPlaceS || !std::isfinite(known.speed_mps)) return std::nullopt;
   if (known.track_probability < kBeginProbability) return std::nullopt;
-  if (!track::lies_there(*map, known.position, known.easting_m, known.northing_m)) return std::nullopt;
+  if (!track::lies_there(*map, known.position, known.pose)) return std::nullopt;
   const double moved_m = known.speed_mps * age_s;
   const double error_m = std::max(known.over_m, known.under_m) + kAccelerationMps2 / 2 * age_s * age_s +
                          (kSpeedErrorShare * std::abs(known.speed_mps) + kSpeedErrorMps) * std::abs(age_s);

@@ -23,8 +23,7 @@ struct KnownPlace {
   double track_probability = 0;
   bool only_told = false;
   bool in_doubt = false;
-  double easting_m = 0;  // on the map of who says it; 0, 0 = not told
-  double northing_m = 0;
+  track::PlanPose pose{};  // of the cab, on the map of who says it; 0, 0 = not told
 };
 
 /// That place as a network fix at a later time: moved on with its speed, and as uncertain as that makes it, so that an

@@ -40,6 +40,11 @@ void TrackDoubt::seen_here() {
   here_at_most_ = 1;
 }
 
+void TrackDoubt::found_here() {
+  seen_here();
+  divided_ = true;
+}
+
 void TrackDoubt::turned(bool fits, bool bends) {
   turned_otherwise_ = fits ? 0 : turned_otherwise_ + 1;
   if (!fits) turned_alike_ = 0;

@@ -23,6 +23,8 @@ class TrackDoubt {
   /// A place on another track was seen with this probability; a place on this one.
   void seen_elsewhere(double probability);
   void seen_here();
+  /// It was searched for, and this is where it fits best: the turns may show that it is elsewhere, switch or no switch.
+  void found_here();
   /// The train turned as this track does, or not; bends: where that says something.
   void turned(bool fits, bool bends);
   /// A switch was run over since anything on this track was seen, or nothing was: only then another one is possible.

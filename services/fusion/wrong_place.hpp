@@ -9,13 +9,14 @@
 namespace railfix::fusion {
 
 /// Who has spoken against a place until it was given up.
-enum class Against : uint8_t { sightings, turning, fusion_before };
+enum class Against : uint8_t { sightings, turning, fusion_before, map_end };
 
 /// What speaks against the place at a moment.
 struct SpeaksAgainst {
   bool turning = false;      // the train turns otherwise than its track, by all that is known
   bool turning_now = false;  // ... and has just done so
   bool gnss = false;         // it contradicts the place
+  bool off_map = false;      // wherever it is, its track has ended on the map
 };
 
 /// A plain value.
@@ -55,6 +56,7 @@ class WrongPlace {
   double lost_m_ = 0;
   double turning_m_ = 0;
   double since_turned_m_ = 1e9;
+  double off_map_m_ = 0;
 };
 
 }  // namespace railfix::fusion

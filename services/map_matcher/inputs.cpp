@@ -54,8 +54,8 @@ bool has_sense(const StateInput& s) {
   const PlacedTrain& p = s.placed;
   return up_to(p.place.offset_m, kLongestM) && up_to(p.distance_m, kLongestM) && p.over_m >= 0 && p.under_m >= 0 &&
          (std::isnan(p.speed_mps) || up_to(p.speed_mps, core::kFastestTrainMps)) && s.sigma_m >= 0 &&
-         within(s.track_probability, 0, 1) && within(s.visual_scale, 0, 2) && up_to(s.easting_m, kLongestM) &&
-         up_to(s.northing_m, kLongestM);
+         within(s.track_probability, 0, 1) && within(s.visual_scale, 0, 2) && up_to(s.pose.easting_m, kLongestM) &&
+         up_to(s.pose.northing_m, kLongestM);
 }
 
 }  // namespace railfix::map_matcher

@@ -31,8 +31,7 @@ struct StateInput {
   double sigma_m = 0;
   double track_probability = 0;
   double visual_scale = 1;
-  double easting_m = 0;
-  double northing_m = 0;
+  track::PlanPose pose;     // of the cab, on the map that the place is of
   bool track_known = true;  // otherwise it is nowhere on the map
   bool usable = true;       // otherwise its place is no position
   bool standstill = false;

@@ -118,7 +118,7 @@ PlaceFixes MapMatcher::add(const StateInput& state) {
 
 std::string MapMatcher::trouble_at(const StateInput& state) {
   if (!map_ || !state.track_known) return placeless();
-  if (!track::lies_there(*map_, state.placed.place, state.easting_m, state.northing_m)) {
+  if (!track::lies_there(*map_, state.placed.place, state.pose)) {
     restart();  // what was matched so far is of another map as well
     return "train_state is of another map than map_matcher.map: give both services the same file";
   }

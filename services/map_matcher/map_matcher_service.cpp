@@ -98,7 +98,7 @@ void MapMatcherService::use(const msg::GnssFix& fix) {
 void MapMatcherService::say(const PlaceFixes& fixes, int64_t grabbed_ns) {
   if (!context_.in_charge()) return;
   for (const auto& fix : fixes) {
-    if (!writer_.write(message_of(fix))) context_.health().dropped(1);
+    if (!writer_.write(message_of(*map_, fix))) context_.health().dropped(1);
     context_.health().output(grabbed_ns);
   }
 }

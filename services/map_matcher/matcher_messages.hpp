@@ -10,6 +10,7 @@
 #include "messaging/messaging.hpp"
 #include "messaging/samples.hpp"
 #include "messaging/topics.hpp"
+#include "track/same_map.hpp"
 
 namespace railfix::map_matcher {
 
@@ -55,8 +56,7 @@ inline StateInput input_of(const msg::TrainState& m) {
           .sigma_m = m.sigma_m(),
           .track_probability = m.track_probability(),
           .visual_scale = m.visual_scale(),
-          .easting_m = m.easting_m(),
-          .northing_m = m.northing_m(),
+          .pose = messaging::pose_of(m),
           .track_known = m.track_known() != 0,
           .usable = m.integrity() != msg::INTEGRITY_UNUSABLE,
           .standstill = m.standstill() != 0,
@@ -80,7 +80,7 @@ inline uint8_t kind_of(FixKind kind) {
   return msg::FIX_GNSS;
 }
 
-inline msg::PositionFix message_of(const PlaceFix& fix) {
+inline msg::PositionFix message_of(const track::Map& map, const PlaceFix& fix) {
   msg::PositionFix message;
   message.stamp_ns(fix.stamp_ns);
   message.kind(kind_of(fix.kind));
@@ -92,6 +92,10 @@ inline msg::PositionFix message_of(const PlaceFix& fix) {
   message.offset_m(best.place.offset_m);
   message.direction(direction_of(best.place.direction));
   message.probability(best.probability);
+  const track::PlanPose pose = track::cab_pose(map, best.place);
+  message.easting_m(pose.easting_m);
+  message.northing_m(pose.northing_m);
+  message.heading_rad(pose.heading_rad);
   const size_t others = std::min<size_t>(fix.options.size() - 1, msg::FIX_ALTERNATIVES);
   for (size_t i = 0; i < others; ++i) {
     const auto& other = fix.options[i + 1];

@@ -31,7 +31,7 @@ static_assert(static_cast<uint8_t>(Reason::error) == msg::REPORT_ERROR);
 
 inline bool of_another_map(const track::Map* map, const msg::TrainState& state) {
   return map != nullptr && state.track_known() != 0 &&
-         !track::lies_there(*map, messaging::place_of(state), state.easting_m(), state.northing_m());
+         !track::lies_there(*map, messaging::place_of(state), messaging::pose_of(state));
 }
 
 inline TrainPosition position_of(const track::Map* map, const msg::TrainState& state) {

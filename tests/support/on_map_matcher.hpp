@@ -57,6 +57,7 @@ class OnMapMatcher : public InLockStep {
     state.under_m(promised_m);
     state.sigma_m(promised_m / 5);
     state.visual_scale(1);
+    state.sources(msg::SOURCE_CAMERA);
     state.track_known(1);
     state.track_probability(1);
     return state;

@@ -126,7 +126,7 @@ class WholeTrain {
   }
   template <class Input>
   void match(const Input& input) {
-    for (const auto& fix : matcher_->add(input)) fixes_.push_back(map_matcher::message_of(fix));
+    for (const auto& fix : matcher_->add(input)) fixes_.push_back(map_matcher::message_of(*ride_.map, fix));
   }
   void use_fixes() {
     for (const auto& fix : std::exchange(fixes_, {})) fusion_.add(fusion::input_of(fix));

@@ -6,6 +6,7 @@
 
 #include "core/random.hpp"
 #include "support/on_map_matcher.hpp"
+#include "track/same_map.hpp"
 
 namespace railfix {
 namespace {
@@ -36,9 +37,10 @@ class MatchedPlace : public ::testing::Test, public test::OnMapMatcher {
     msg::TrainState here = state(place, promised_m);
     const auto said = last_of_track();
     if (said && said->stamp_ns() > placeless_ns_) here.track_probability(said->probability());  // as fusion believes it
-    const auto pose = map.edge(place.edge)->alignment.at(place.offset_m).pose;
+    const auto pose = track::cab_pose(map, place);
     here.easting_m(pose.easting_m);
     here.northing_m(pose.northing_m);
+    here.heading_rad(pose.heading_rad);
     states_.write(here);
     steps_.write(step());
     match();

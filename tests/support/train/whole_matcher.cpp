@@ -26,7 +26,7 @@ void WholeMatcher::give(const Input& input) {
 }
 
 void WholeMatcher::say(const map_matcher::PlaceFixes& fixes) {
-  for (const auto& fix : fixes) found_.push_back(fusion::input_of(map_matcher::message_of(fix)));
+  for (const auto& fix : fixes) found_.push_back(fusion::input_of(map_matcher::message_of(*simulation_.map, fix)));
 }
 
 void WholeMatcher::feel(const fusion::ImuInput& sample) {

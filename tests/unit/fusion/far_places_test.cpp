@@ -85,6 +85,21 @@ TEST(FarPlaces, BeyondTheEndOfTheMapGnssHoldsNobodyBack) {
   EXPECT_GE(state.position.offset_m + state.under_m, 20300);
 }
 
+// There is no track of this map: nothing is lost by looking for the train on all of it.
+TEST(FarPlaces, FarBeyondTheEndOfTheMapThePlaceIsGivenUp) {
+  auto fusion = fusion_at(19500);
+  const auto near = run(fusion, 0, 60, 20);
+  EXPECT_TRUE(near.track_known) << "700 m beyond the end";
+  const auto far = run(fusion, 60, 95, 20);
+  EXPECT_FALSE(far.track_known);
+  EXPECT_THAT(far.reason, HasSubstr("has run far beyond the end of the mapped track"));
+  EXPECT_NEAR(far.distance_m, 1900, 1);
+  auto back = fix_at(95, 300, 0);
+  back.kind = FixKind::network;
+  fusion.add(back);
+  EXPECT_NEAR(run(fusion, 95, 96, 20).position.offset_m, 320, 5) << "behind the gap";
+}
+
 TEST(FarPlaces, AFixForTheOtherDirectionIsNoPlaceOnTheWay) {
   auto fusion = fusion_at(1000);
   run(fusion, 0, 10, 20);
@@ -132,6 +147,18 @@ TEST(FarPlaces, AStartThatGnssContradictsIsNotUsed) {
     go_on(10 * landmark, 10 * landmark + 10, 1000);
   }
   EXPECT_EQ(state.integrity, Integrity::degraded) << state.reason;
+}
+
+// Of all places on its way the end is the nearest one, and the train cannot be there.
+TEST(FarPlaces, NorIsOneThatGnssContradictsFromBeyondTheEndOfItsWay) {
+  auto fusion = fusion_at(1000);
+  TrainEstimate state;
+  for (int t_s = 0; t_s < 10; ++t_s) {
+    state = run(fusion, t_s, t_s + 1, 20);
+    fusion.add(GnssInput{at(t_s + 1.001), 0, 26000 + 20.0 * t_s, 1.0, 1});
+  }
+  EXPECT_EQ(state.integrity, Integrity::unusable);
+  EXPECT_THAT(state.reason, HasSubstr("GNSS contradicts the position"));
 }
 
 }  // namespace

@@ -68,10 +68,10 @@ TEST(Handover, NotWhereASwitchMayHaveLedTheTrainElsewhere) {
 TEST(Handover, NotWhereItIsOfAnotherMap) {
   const auto pose = balise_map()->edge(1)->alignment.at(300).pose;
   KnownPlace known = at(300, 20);
-  known.easting_m = pose.easting_m;
-  known.northing_m = pose.northing_m + 0.5;
+  known.pose = pose;
+  known.pose.northing_m += 0.5;
   EXPECT_TRUE(place_at(balise_map(), known, after(1), kFactor));
-  known.northing_m += 3900;
+  known.pose.northing_m += 3900;
   EXPECT_FALSE(place_at(balise_map(), known, after(1), kFactor));
 }
 

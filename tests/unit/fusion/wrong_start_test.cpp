@@ -11,6 +11,7 @@ namespace railfix::fusion::wrong_start_test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr double kSpeedMps = 20;
 
@@ -95,6 +96,14 @@ TEST_F(WrongStart, IsNoPositionAfter300AndGivenUpAfter1000MetresOfTurningOtherwi
   EXPECT_TRUE(state.track_known);
   EXPECT_NEAR(state.position.offset_m, 5100, 1);
   EXPECT_EQ(state.reason.find("given up"), std::string::npos) << state.reason;
+}
+
+TEST_F(WrongStart, IsToldByTurningAlsoWhereItWasSearchedForAndNoSwitchWasPassed) {
+  fusion_ = fusion_without_start();
+  go_straight();
+  find(told_m());
+  EXPECT_THAT(go(100, [&] { turn(0); }).reason, Not(HasSubstr("turns otherwise")));
+  EXPECT_THAT(go(300, [&] { turn(1.0 / 700); }).reason, HasSubstr("turns otherwise than this track"));
 }
 
 TEST_F(WrongStart, IsKeptWhereTheTrainTurnsAsTheTrackDoesButForSomeBumps) {

@@ -70,8 +70,7 @@ class Beside : public testing::TestWithParam<bool> {
     state.placed.under_m = ahead_m_;
     state.sigma_m = 1;
     state.track_probability = probability_;
-    state.easting_m = edge_ == kTold ? kApartM : 0;
-    state.northing_m = at_m_;
+    state.pose = {edge_ == kTold ? kApartM : 0, at_m_, 0};
     state.track_known = state.usable = true;
     state.gnss_agrees = true;
     return state;

@@ -57,14 +57,14 @@ TEST(Inputs, NoFieldMayBeWhatIsNoNumber) {
 }
 
 TEST(Inputs, NoFieldOfAStateMayBeWhatIsNoNumber) {
-  const StateInput good{{1, {1, 100, track::Direction::forward}, 20, 500, 3, 3}, 1, 1, 1, 1000, 2000};
+  const StateInput good{{1, {1, 100, track::Direction::forward}, 20, 500, 3, 3}, 1, 1, 1, {1000, 2000, 0}};
   using Field = std::function<double&(StateInput&)>;
   const std::vector<Field> fields = {[](auto& s) -> double& { return s.placed.place.offset_m; },
                                      [](auto& s) -> double& { return s.placed.distance_m; },
                                      [](auto& s) -> double& { return s.track_probability; },
                                      [](auto& s) -> double& { return s.visual_scale; },
-                                     [](auto& s) -> double& { return s.easting_m; },
-                                     [](auto& s) -> double& { return s.northing_m; }};
+                                     [](auto& s) -> double& { return s.pose.easting_m; },
+                                     [](auto& s) -> double& { return s.pose.northing_m; }};
   EXPECT_TRUE(has_sense(good));
   for (size_t i = 0; i < fields.size(); ++i) {
     for (const double none : kNone) {

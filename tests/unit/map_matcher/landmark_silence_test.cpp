@@ -115,7 +115,7 @@ TEST(MapMatcherSilence, IsItsTroubleWhileRailsAreSeenAndUntilALandmarkIsSighted)
       state.placed = {stamp_ns, {1, at_m, track::Direction::forward}, 25, at_m, 3, 3};
       state.sigma_m = 0.7;
       state.track_probability = 1;
-      state.northing_m = at_m;
+      state.pose.northing_m = at_m;
       matcher.add(state);
     }
     return core::to_ns(1 + (at_m - 5) / 25);

@@ -37,7 +37,7 @@ class MapMatcherRide : public testing::Test {
     state.placed = {stamp_ns_, place(at_m_), kSpeedMps, way_m, 3, 3};
     state.sigma_m = 0.7;
     state.track_probability = 1;
-    state.northing_m = at_m_;
+    state.pose.northing_m = at_m_;
     state.track_known = known_;
     return state;
   }
@@ -153,7 +153,7 @@ TEST_F(MapMatcherRide, AStateOfAnotherMapIsNamedAndNothingIsMatchedThere) {
   run_to(510);
   EXPECT_FALSE(frog().empty());
   auto elsewhere = state();
-  elsewhere.easting_m = 7000;
+  elsewhere.pose.easting_m = 7000;
   EXPECT_TRUE(matcher_.add(elsewhere).empty());
   EXPECT_THAT(matcher_.trouble(), HasSubstr("another map"));
   EXPECT_TRUE(matcher_.add(step()).empty());
@@ -207,9 +207,7 @@ class ShapeInTheDark : public testing::TestWithParam<Camera> {
       state.sigma_m = 7;
       state.track_known = true;
       state.camera_agrees = camera != Camera::drifts;
-      const auto pose = alignment.at(at_m - kOffM).pose;
-      state.easting_m = pose.easting_m;
-      state.northing_m = pose.northing_m;
+      state.pose = alignment.at(at_m - kOffM).pose;
       auto said = matcher_.add(state);
       if (camera != Camera::none) {
         const auto more = matcher_.add(step(camera, ns((i - 1) * kPeriodS), ns(i * kPeriodS)));

@@ -139,13 +139,28 @@ TEST(Path, IsFollowedOnWithItsDistances) {
 
 TEST(SameMap, APlaceThatLiesElsewhereIsOfAnotherMap) {
   const auto map = shared_small_map();
-  const auto pose = map->edge(2)->alignment.at(300).pose;
-  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::reverse}, pose.easting_m + 0.1, pose.northing_m));
-  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::forward}, NAN, NAN));
-  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::forward}, 0, 0)) << "not told";
-  EXPECT_FALSE(lies_there(*map, {2, 310, Direction::forward}, pose.easting_m, pose.northing_m));
-  EXPECT_FALSE(lies_there(*map, {1, 300, Direction::forward}, pose.easting_m, pose.northing_m));
-  EXPECT_FALSE(lies_there(*map, {99, 300, Direction::forward}, NAN, NAN));
+  PlanPose pose = cab_pose(*map, {2, 300, Direction::forward});
+  const PlanPose not_told{0, 0, pose.heading_rad};
+  const PlanPose none{NAN, NAN, NAN};
+  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::forward}, none));
+  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::forward}, not_told));
+  EXPECT_FALSE(lies_there(*map, {2, 310, Direction::forward}, pose));
+  EXPECT_FALSE(lies_there(*map, {1, 300, Direction::forward}, pose));
+  EXPECT_FALSE(lies_there(*map, {99, 300, Direction::forward}, none));
+  pose.easting_m += 0.1;
+  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::forward}, pose));
+}
+
+// In the middle of its edge one that is numbered from the other end lies where it should.
+TEST(SameMap, ATrackThatIsDrawnTheOtherWayRoundIsOfAnotherMap) {
+  const auto map = shared_small_map();
+  PlanPose pose = cab_pose(*map, {2, 300, Direction::reverse});
+  pose.heading_rad += 2 * core::kPi;
+  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::reverse}, pose));
+  EXPECT_FALSE(lies_there(*map, {2, 300, Direction::forward}, pose));
+  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::unknown}, pose)) << "whose direction is not told";
+  pose.heading_rad = NAN;
+  EXPECT_TRUE(lies_there(*map, {2, 300, Direction::forward}, pose));
 }
 
 TEST(Path, GoesOnWithItsDistancesOnAnotherTrackBehindASwitch) {

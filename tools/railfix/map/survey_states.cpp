@@ -40,9 +40,7 @@ class PlaceColumns {
         table.text(direction_) == "-" ? track::Direction::reverse : track::Direction::forward};
     if (!possible || map.edge(place.edge) == nullptr) {
       table.refuse("edge " + std::to_string(edge) + " is not on the map; was the run made on it?");
-    } else if (easting_ && northing_ &&
-               !track::lies_there(map, place, table.number_or_nan(easting_, core::kFarthestM),
-                                  table.number_or_nan(northing_, core::kFarthestM))) {
+    } else if (easting_ && northing_ && !track::lies_there(map, place, pose(table))) {
       table.refuse("this map has edge " + std::to_string(edge) +
                    " elsewhere than at the row's easting_m and northing_m; give the map that the run was made on");
     }
@@ -50,6 +48,11 @@ class PlaceColumns {
   }
 
  private:
+  [[nodiscard]] track::PlanPose pose(core::CsvTable& table) const {
+    return {table.number_or_nan(easting_, core::kFarthestM), table.number_or_nan(northing_, core::kFarthestM),
+            std::numeric_limits<double>::quiet_NaN()};
+  }
+
   size_t edge_, offset_, direction_;
   std::optional<size_t> easting_, northing_;
 };
