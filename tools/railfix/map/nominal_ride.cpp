@@ -141,7 +141,7 @@ class NominalRide {
   }
 
   void use(const map_matcher::PlaceFixes& fixes) {
-    for (const map_matcher::PlaceFix& fix : fixes) fusion_.add(fusion::input_of(map_matcher::message_of(fix)));
+    for (const map_matcher::PlaceFix& fix : fixes) fusion_.add(fusion::input_of(map_matcher::message_of(*map_, fix)));
   }
 
   const fusion::FusionParameters& parameters_;
