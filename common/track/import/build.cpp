@@ -7,6 +7,7 @@
 #include "core/whole_file.hpp"
 #include "track/import/finish.hpp"
 #include "track/import/local_crs.hpp"
+#include "track/import/meeting.hpp"
 #include "track/import/network.hpp"
 #include "track/import/osm/osm_chains.hpp"
 #include "track/import/osm/osm_network.hpp"
@@ -146,6 +147,7 @@ class Sources {
     map_.q_locacc_m = std::max(map_.q_locacc_m, all_surveyed ? kSurveyLocationM : kMappingLocationM);
     add_virtual_groups();
     if (!options_.landmarks.empty()) core::ok_or_throw(keep_landmarks(map_, options_.landmarks));
+    tell_not_joined();
     std::ranges::move(problems_of(map_), std::back_inserter(cuts_));
     std::ranges::move(map_.problems, std::back_inserter(cuts_));
     map_.problems = std::move(cuts_);
@@ -157,8 +159,19 @@ class Sources {
   /// The index of its first node.
   size_t add(const Draft& draft) {
     const size_t first = map_.nodes.size();
+    const size_t first_edge = map_.edges.size();
     append(draft, map_);
+    if (first_edge > 0) not_joined_ += ends_on_edges_before(map_, first_edge);
     return first;
+  }
+
+  void tell_not_joined() {
+    if (not_joined_ == 0) return;
+    cuts_.insert(cuts_.begin(), std::to_string(not_joined_) +
+                                    " ends of one input's tracks lie on those of another and are not joined: only "
+                                    "OpenStreetMap data among themselves, and plans in LandXML, are. Build the map "
+                                    "anew from its sources; loose ends, switches of two tracks and parts out of reach "
+                                    "come of it, too");
   }
 
   void take(LandXml read, const std::filesystem::path& file) {
@@ -304,6 +317,7 @@ class Sources {
   std::optional<std::filesystem::path> erju_map_;
   OsmData osm_;
   std::vector<InputPlace> places_;  // of what lies in latitude and longitude
+  size_t not_joined_ = 0;           // ends of what was added on what was there before
   std::string source_crs_;
   std::string plane_source_;  // the first one's file
   bool has_plane_source_ = false;

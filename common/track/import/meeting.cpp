@@ -198,6 +198,20 @@ std::vector<std::string> near_misses(const Map& map) {
   return problems;
 }
 
+size_t ends_on_edges_before(const Map& map, size_t first) {
+  const TrackFinder tracks(std::shared_ptr<const Map>(std::shared_ptr<void>(), &map));  // the map outlives it
+  size_t count = 0;
+  for (size_t i = first; i < map.edges.size(); ++i) {
+    if (map.edges[i].is_drawn) continue;
+    for (const bool at_end : {false, true}) {
+      const PlanPose pose = leaving(map.edges[i], at_end);
+      const auto near = tracks.near(pose.easting_m, pose.northing_m, kLyingM);
+      count += std::ranges::any_of(near, [&](const NearTrack& one) { return one.edge <= first; }) ? 1 : 0;
+    }
+  }
+  return count;
+}
+
 std::vector<std::string> lying_on_others(const Map& map) {
   const TrackFinder tracks(std::shared_ptr<const Map>(std::shared_ptr<void>(), &map));  // the map outlives it
   std::vector<std::string> problems;

@@ -19,6 +19,9 @@ constexpr double kNearMissM = 1.5;
 /// the branch of a switch is. A buffer stop beside the next track is neither.
 std::vector<std::string> near_misses(const Map& map);
 
+/// How many ends of edges from this index on touch the edges before it.
+size_t ends_on_edges_before(const Map& map, size_t first);
+
 /// Edges that lie on others for 100 m or more, as no branch does.
 std::vector<std::string> lying_on_others(const Map& map);
 

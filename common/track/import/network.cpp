@@ -163,6 +163,13 @@ double turn_between_rad(double leaving_a_rad, double leaving_b_rad) {
   return std::abs(core::wrap_pi(leaving_b_rad - leaving_a_rad - core::kPi));
 }
 
+/// The least that the source leaves room for: its first metres may be drawn askew.
+double least_turn_rad(const EdgeEnd& a, const EdgeEnd& b) {
+  const double first_rad = turn_between_rad(a.leaving_rad, b.leaving_rad);
+  if (!a.onward || !b.onward) return first_rad;
+  return std::min(first_rad, turn_between_rad(a.onward->heading_rad, b.onward->heading_rad));
+}
+
 double bonus_for_line_rad(const std::string& a, const std::string& b) {
   return !a.empty() && a == b ? kSameLineRad : 0.0;
 }
@@ -192,6 +199,13 @@ std::vector<Pair> possible_pairs(const Draft& draft, const DraftNode& node, cons
   }
   std::sort(pairs.begin(), pairs.end(), [](const Pair& x, const Pair& y) { return x.cost_rad < y.cost_rad; });
   return pairs;
+}
+
+bool only_cross(const DraftNode& node, const std::vector<EdgeEnd>& ends, const std::vector<WayOver>& straight,
+                const std::vector<WayOver>& diverging) {
+  if (node.is_switch || node.ways_are_told || ends.size() != 4 || straight.size() != 2) return false;
+  return std::ranges::all_of(
+      diverging, [&](const WayOver& way) { return least_turn_rad(ends[way.a], ends[way.b]) > kSharpestSlipRad; });
 }
 
 NodeKind kind_of(const DraftNode& node, size_t ends, const std::vector<WayOver>& ways) {
@@ -226,6 +240,7 @@ std::vector<WayOver> ways_over(const Draft& draft, size_t node, const std::vecto
       diverging.push_back({pair.a, pair.b, true});
     }
   }
+  if (only_cross(draft.nodes[node], ends, straight, diverging)) return straight;
   straight.insert(straight.end(), diverging.begin(), diverging.end());
   return straight;
 }

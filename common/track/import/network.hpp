@@ -17,6 +17,10 @@ namespace railfix::track {
 /// No track turns more sharply at a node.
 inline constexpr double kSharpestTurnRad = core::kPi / 3.0;
 
+/// No slip leads a train more sharply from one track to the other. Those of 1 : 4.8, the shortest there are, turn by 12
+/// degrees; the rest is for the drawing.
+inline constexpr double kSharpestSlipRad = core::rad_from_deg(15.0);
+
 /// The source says that trains run over a node from one edge's end to another's.
 struct ToldWay {
   std::pair<size_t, bool> a;  // edge (index into Draft::edges), at its end
@@ -78,7 +82,8 @@ std::vector<std::vector<EdgeEnd>> ends_at_nodes(const Draft& draft);
 
 /// Straight ways first. Two ends are connected where the source says so, or where it says nothing and the turn between
 /// them is less than 60 degrees. The smallest turn is the straight way, unless it is little smaller than that of what
-/// belongs together: pieces of a line, of a running line, of a way of the source.
+/// belongs together: pieces of a line, of a running line, of a way of the source. Two tracks that meet at more than 15
+/// degrees and both go on only cross, unless the source calls it a switch.
 std::vector<WayOver> ways_over(const Draft& draft, size_t node, const std::vector<EdgeEnd>& ends);
 
 /// A node that lies on a track.

@@ -1,10 +1,12 @@
 // How problems name an edge and write a number.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "core/units.hpp"
 #include "track/map.hpp"
@@ -39,6 +41,14 @@ inline std::string told_left_out(size_t points, double most_m) {
 /// Behind the first of so many that a sentence is about.
 inline std::string told_as_more(size_t count) {
   return count > 1 ? ", as " + std::to_string(count - 1) + " more," : "";
+}
+
+/// "a, b, c and 14 more"
+inline std::string told_list(const std::vector<std::string>& names, size_t most = 3) {
+  std::string list;
+  const size_t named = std::min(most, names.size());
+  for (size_t i = 0; i < named; ++i) list += (i == 0 ? "" : ", ") + names[i];
+  return list + (names.size() > named ? " and " + std::to_string(names.size() - named) + " more" : "");
 }
 
 inline std::string called(const Edge& edge) {

@@ -85,7 +85,11 @@ void leave_out(SimulationPlan& plan, const std::string& names) {
 }
 
 void load_map(Arguments& a) {
-  if (a.map.empty()) return;
+  if (a.map.empty()) {
+    if (!a.start.empty()) throw core::BadInput("--start is a place on a map: give --map, too");
+    return;
+  }
+  if (a.start.empty()) throw core::BadInput("--map " + a.map + ": where do the trains begin? Give --start EDGE:OFFSET");
   auto map = std::make_shared<const track::Map>(core::value_or_throw(track::Map::load(a.map)));
   a.plan.starts.push_back(core::value_or_throw(map->parse_position(a.start)));
   a.plan.map = std::move(map);
@@ -213,7 +217,7 @@ void add_options(CLI::App& app, Arguments& a) {
   app.add_option("--fault", a.fault, "all, none, SENSOR or SENSOR:KIND")->capture_default_str();
   app.add_option("--without", a.without, "Leave out any of " + names_left_out() + " (comma between)");
   app.add_option("--map", a.map, "Compiled map instead of random lines");
-  app.add_option("--start", a.start, "EDGE:OFFSET[:+|-] on the map");
+  app.add_option("--start", a.start, "EDGE:OFFSET[:+|-] on the map, where every run begins");
   app.add_option("--stanford", a.stanford, "Write the Stanford diagram (SVG)");
   app.add_option("--run", a.run, "Print one run of the campaign second by second")
       ->check(tool::whole_number(0, std::numeric_limits<int64_t>::max()));

@@ -76,6 +76,15 @@ TEST(MeasuringTools, OptionsGoOverScenarioFiles) {
   EXPECT_EQ(measured("0.05"), measured("0.001"));
 }
 
+TEST(MeasuringTools, TheCampaignOnAMapAsksWhereItBegins) {
+  const auto no_start = test::run_program({"railfix-measure-confidence", "--map", "some.map"}, kPatienceS);
+  EXPECT_EQ(no_start.exit_code, 2);
+  EXPECT_NE(no_start.err.find("Give --start EDGE:OFFSET"), std::string::npos) << no_start.err;
+  const auto no_map = test::run_program({"railfix-measure-confidence", "--start", "1:5"}, kPatienceS);
+  EXPECT_EQ(no_map.exit_code, 2);
+  EXPECT_NE(no_map.err.find("give --map, too"), std::string::npos) << no_map.err;
+}
+
 TEST(MeasuringTools, RefuseNumbersThatMeanNothing) {
   const std::vector<std::vector<std::string>> wrong{
       {"railfix-measure-confidence", "--threads", "0"},

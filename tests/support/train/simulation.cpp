@@ -173,13 +173,17 @@ Motion TrainSimulation::pictured_at(int64_t stamp_ns, double arrival_s) const {
 }
 
 std::optional<double> TrainSimulation::error_m(const track::EdgePosition& place, const Motion& truth) const {
-  const auto distance_m = path_->distance_of(place.edge, place.offset_m);
+  // A way may lead over one edge twice, as around a balloon loop: the pass that the train is on counts.
+  const auto distance_m = path_->distance_of(place, truth.distance_m);
   if (distance_m) return *distance_m - truth.distance_m;
-  const auto points = std::ranges::find(points_, place.edge, [](const Points& one) { return one.other.edge->id; });
-  if (points == points_.end()) return std::nullopt;
-  const auto& other = points->other;
-  const double behind_m = other.forward ? place.offset_m : other.length_m() - place.offset_m;
-  return points->distance_m + behind_m - truth.distance_m;
+  std::optional<double> nearest_m;
+  for (const auto& [at_m, other] : points_) {
+    if (other.edge->id != place.edge) continue;
+    const double behind_m = other.forward ? place.offset_m : other.length_m() - place.offset_m;
+    const double one_m = at_m + behind_m - truth.distance_m;
+    if (!nearest_m || std::abs(one_m) < std::abs(*nearest_m)) nearest_m = one_m;
+  }
+  return nearest_m;
 }
 
 bool TrainSimulation::on_way(const track::EdgePosition& place) const {

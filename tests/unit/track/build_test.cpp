@@ -190,6 +190,31 @@ TEST_F(BuildTest, LinesOfOnePointAreToldAsSuch) {
               HasSubstr("no railway track has two points (way 7 has 1 on the earth)"));
 }
 
+// A map that lacks a track makes another one look alone.
+TEST_F(BuildTest, TracksWithoutAShapeAreToldBesideOthers) {
+  const auto feature = [](int id, const std::string& geometry) {
+    return R"(,{"type":"Feature","id":"way/)" + std::to_string(id) +
+           R"(","properties":{"railway":"rail"},"geometry":)" + geometry + "}";
+  };
+  const auto line = [](const std::string& points) { return R"({"type":"LineString","coordinates":[)" + points + "]}"; };
+  std::string text = track_of("[15.0,48.0],[15.01,48.0]");
+  text.insert(text.size() - 2, feature(2, "null") + feature(3, R"({"type":"GeometryCollection","geometries":[]})") +
+                                   feature(4, R"({"type":"MultiLineString","coordinates":[]})") + feature(5, line("")) +
+                                   feature(6, line("[15.0,48.0]")) + feature(7, line("[15.0,48.0],[15.0,48.0]")) +
+                                   feature(8, line("[15.0,48.0],[15.01,48.0]")));
+  EXPECT_THAT(core::value_or_throw(build_map({write("a.geojson", text)}, {})).map.problems,
+              testing::ElementsAre(
+                  "3 features are railway tracks by their tags but have no line; left out: export the ways with their "
+                  "geometry",
+                  "3 railway ways have no two points apart from each other; left out: way 5, way 6, way 7"));
+  const auto overpass = write("b.json", R"({"elements":[{"type":"node","id":1,"lat":48,"lon":15},
+{"type":"node","id":2,"lat":48,"lon":15.01},{"type":"way","id":5,"nodes":[1,2],"tags":{"railway":"rail"}},
+{"type":"way","id":6,"nodes":[2],"tags":{"railway":"rail"}},{"type":"way","id":7,"tags":{"railway":"rail"}}]})");
+  EXPECT_THAT(core::value_or_throw(build_map({overpass}, {})).map.problems,
+              testing::ElementsAre(HasSubstr("2 railway ways have no two points apart from each other; left out: way "
+                                             "6, way 7")));
+}
+
 TEST_F(BuildTest, FilesCutShortAreToldAsSuch) {
   EXPECT_THAT(message({write("a.pbf", "")}), HasSubstr("the file is empty ("));
   EXPECT_THAT(message({write("a.osm.bz2", "")}), HasSubstr("the file is empty ("));

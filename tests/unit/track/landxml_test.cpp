@@ -216,6 +216,14 @@ TEST_F(LandXmlTest, TellsOfStationsOutsideTheAlignment) {
                                    AllOf(HasSubstr("L1: 2 of 2 cant stations"), HasSubstr(": 1100"))));
 }
 
+TEST_F(LandXmlTest, TellsAnAlignmentWithoutAPlan) {
+  std::string text = kSample;
+  text.insert(text.find("</Alignments>"), "<Alignment name=\"L2\" length=\"5\" staStart=\"0\"/>");
+  const LandXml read = core::value_or_throw(read_landxml(write("l.xml", text)));
+  EXPECT_EQ(read.tracks.size(), 1U);
+  EXPECT_THAT(read.problems, testing::ElementsAre("L2 in line 10 has no <CoordGeom>; it is left out"));
+}
+
 TEST_F(LandXmlTest, TellsWhatIsThereTwice) {
   std::string text = kSample;
   text.insert(text.find("</Alignment>"), "<Cant/>");

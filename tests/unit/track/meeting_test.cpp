@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "core/units.hpp"
+#include "import_fixture.hpp"
 #include "small_map.hpp"
+#include "track/import/build.hpp"
 #include "track/import/finish.hpp"
 
 namespace railfix::track {
@@ -216,6 +218,29 @@ TEST(LyingOnOthers, BranchesCrossingsAndTheNextTrackAreSound) {
   drawn.edges[1].is_drawn = true;
   EXPECT_THAT(lying_on_others(drawn), IsEmpty());
   EXPECT_THAT(lying_on_others(small_map()), IsEmpty());
+}
+
+using NotJoinedTest = ImportTest;
+
+std::string track_between(const std::string& from_deg, const std::string& to_deg) {
+  return R"({"features":[{"type":"Feature","properties":{"railway":"rail"},
+"geometry":{"type":"LineString","coordinates":[[)" +
+         from_deg + ",48.0],[" + to_deg + ",48.0]]}}]}";
+}
+
+TEST_F(NotJoinedTest, WhatTouchesACompiledMapIsToldFirst) {
+  const auto west = write("west.geojson", track_between("15.0", "15.01"));
+  const auto east = write("east.geojson", track_between("15.01", "15.02"));
+  const auto away = write("away.geojson", track_between("15.1", "15.12"));
+  const auto compiled = in_folder("west.map");
+  ASSERT_TRUE(core::value_or_throw(build_map({west}, {})).map.save(compiled).ok());
+  const auto problems = [](const std::vector<std::filesystem::path>& inputs) {
+    return core::value_or_throw(build_map(inputs, {})).map.problems;
+  };
+  EXPECT_THAT(problems({compiled, east}).front(),
+              HasSubstr("1 ends of one input's tracks lie on those of another and are not joined"));
+  EXPECT_THAT(problems({west, east}), IsEmpty());
+  EXPECT_THAT(problems({compiled, away}), ElementsAre(HasSubstr("cannot be reached")));
 }
 
 }  // namespace

@@ -67,18 +67,6 @@ std::vector<ServiceResult> judge_services(const std::vector<StatusRow>& rows) {
   return results;
 }
 
-ReportResult judge_reports(const std::vector<ReportRow>& rows) {
-  ReportResult result;
-  std::vector<double> doubt;
-  for (const ReportRow& row : rows) {
-    ++result.reports;
-    result.with_position += row.position_known ? 1 : 0;
-    doubt.push_back(row.doubt_over_m + row.doubt_under_m);
-  }
-  result.doubt_m = summarise(std::move(doubt));
-  return result;
-}
-
 core::Status check_times(const Truth& truth, const RunTables& run) {
   using Span = RunTables::Span;
   const Span real{truth.rows().front().stamp_ns, truth.rows().back().stamp_ns};
@@ -130,7 +118,7 @@ Stretch covered(const Truth& truth, const std::optional<Stretch>& ran) {
 
 }  // namespace
 
-Evaluation evaluate(const Truth& truth, const RunTables& run) {
+Evaluation evaluate(const Truth& truth, const RunTables& run, const ReportGround& ground) {
   Evaluation result;
   const auto ran = steps_of(run);
   const Stretch stretch = covered(truth, ran);
@@ -155,7 +143,7 @@ Evaluation evaluate(const Truth& truth, const RunTables& run) {
     result.fixes.emplace();
     for (const FixRow& fix : *run.fixes) ++(*result.fixes)[fix.kind];
   }
-  if (run.reports) result.reports = judge_reports(*run.reports);
+  if (run.reports) result.reports = judge_reports(truth, *run.reports, ground);
   if (run.status) result.services = judge_services(*run.status);
   return result;
 }

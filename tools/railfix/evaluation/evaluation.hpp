@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "evaluation/motion.hpp"
+#include "evaluation/reports.hpp"
 #include "evaluation/seeing.hpp"
 
 namespace railfix::evaluation {
@@ -26,13 +27,6 @@ struct ServiceResult {
   std::string last_state;
 };
 std::vector<ServiceResult> judge_services(const std::vector<StatusRow>& rows);
-
-struct ReportResult {
-  size_t reports = 0;
-  size_t with_position = 0;
-  Summary doubt_m;  // over + under
-};
-ReportResult judge_reports(const std::vector<ReportRow>& rows);
 
 /// What is not in the run is nothing.
 struct Evaluation {
@@ -58,7 +52,7 @@ struct Evaluation {
 };
 /// An error names both times where the truth has none in common with the run, or with a table of every step.
 core::Status check_times(const Truth& truth, const RunTables& run);
-Evaluation evaluate(const Truth& truth, const RunTables& run);
+Evaluation evaluate(const Truth& truth, const RunTables& run, const ReportGround& ground = {});
 
 /// Of a ride that goes on without the run, or began before it.
 inline bool is_part(const Evaluation& evaluation) {

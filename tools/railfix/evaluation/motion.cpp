@@ -11,7 +11,6 @@ namespace {
 
 constexpr double kWindowM = 100.0;
 constexpr double kWindowStepM = 10.0;
-constexpr double kOwnTrackM = 2.0;  // neighbouring tracks are at least 3.5 m apart
 
 double speed_rms(const std::vector<MotionSample>& samples) {
   std::vector<double> errors;

@@ -135,6 +135,19 @@ void print_services(std::ostream& out, const std::vector<ServiceResult>& service
   }
 }
 
+void print_reports(std::ostream& out, const ReportResult& reports) {
+  out << "position reports\n";
+  line(out, "reports",
+       std::to_string(reports.reports) + ", " + std::to_string(reports.with_position) + " with a position; doubt " +
+           spread(reports.doubt_m, metres));
+  if (reports.judged > 0)
+    line(out, "wrong",
+         std::to_string(reports.wrong) + " of " + std::to_string(reports.judged) + " judged; group elsewhere " +
+             std::to_string(reports.wrong_group) + ", direction " + std::to_string(reports.wrong_direction) +
+             ", interval without the front end " + std::to_string(reports.wrong_interval));
+  for (const auto& [why, count] : reports.not_judged) line(out, "not judged", std::to_string(count) + " " + why);
+}
+
 ordered_json to_json(const Summary& summary) {
   return {{"count", summary.count},
           {"mean", summary.mean},
@@ -227,6 +240,18 @@ ordered_json sightings_json(const SightingResult& sightings) {
   return json;
 }
 
+ordered_json reports_json(const ReportResult& reports) {
+  return {{"count", reports.reports},
+          {"with_position", reports.with_position},
+          {"doubt_m", to_json(reports.doubt_m)},
+          {"judged", reports.judged},
+          {"wrong", reports.wrong},
+          {"wrong_group", reports.wrong_group},
+          {"wrong_direction", reports.wrong_direction},
+          {"wrong_interval", reports.wrong_interval},
+          {"not_judged", reports.not_judged}};
+}
+
 ordered_json services_json(const std::vector<ServiceResult>& services) {
   ordered_json json = ordered_json::array();
   for (const ServiceResult& s : services) {
@@ -295,12 +320,7 @@ void print(const Evaluation& evaluation, std::ostream& out) {
     out << "position fixes\n";
     for (const auto& [kind, count] : *evaluation.fixes) line(out, kind, std::to_string(count));
   }
-  if (evaluation.reports) {
-    out << "position reports\n";
-    line(out, "reports",
-         std::to_string(evaluation.reports->reports) + ", " + std::to_string(evaluation.reports->with_position) +
-             " with a position; doubt " + spread(evaluation.reports->doubt_m, metres));
-  }
+  if (evaluation.reports) print_reports(out, *evaluation.reports);
   if (evaluation.services) print_services(out, *evaluation.services);
   for (const std::string& name : evaluation.missing) out << name << ": not in this run\n";
   for (const std::string& name : evaluation.empty) out << name << ": has a header and no row, not judged\n";
@@ -331,10 +351,7 @@ ordered_json to_json(const Evaluation& evaluation) {
   json["edges"] = or_null(evaluation.edges, edges_json);
   json["sightings"] = or_null(evaluation.sightings, sightings_json);
   json["position_fixes"] = or_null(evaluation.fixes, [](const auto& fixes) { return ordered_json(fixes); });
-  json["reports"] = or_null(evaluation.reports, [](const ReportResult& reports) {
-    return ordered_json{
-        {"count", reports.reports}, {"with_position", reports.with_position}, {"doubt_m", to_json(reports.doubt_m)}};
-  });
+  json["reports"] = or_null(evaluation.reports, reports_json);
   json["services"] = or_null(evaluation.services, services_json);
   double dropped = 0;
   for (const ServiceResult& service : evaluation.services.value_or(std::vector<ServiceResult>{}))

@@ -133,9 +133,24 @@ Status read(const fs::path& file, std::vector<ReportRow>& rows) {
   const size_t distance = table.required({"d_lrbg_m"});
   const size_t over = table.required({"l_doubtover_m"});
   const size_t under = table.required({"l_doubtunder_m"});
+  const std::optional<size_t> group = table.optional({"nid_lrbg"});
+  const std::optional<size_t> sides[] = {table.optional({"q_dirlrbg"}), table.optional({"q_dlrbg"}),
+                                         table.optional({"q_dirtrain"})};
+  const auto side = [&](size_t i) {
+    const double said = table.number_or_nan(sides[i]);
+    return said == 0 || said == 1 ? static_cast<uint32_t>(said) : uint32_t{etcs::kUnknownSide};
+  };
   while (table.next()) {
-    rows.push_back({table.integer(stamp), std::isfinite(table.number_or_nan(distance, core::kFarthestM)),
-                    table.number_or_nan(over, core::kWidestM), table.number_or_nan(under, core::kWidestM)});
+    ReportRow row{.stamp_ns = table.integer(stamp),
+                  .d_lrbg_m = table.number_or_nan(distance, core::kFarthestM),
+                  .doubt_over_m = table.number_or_nan(over, core::kWidestM),
+                  .doubt_under_m = table.number_or_nan(under, core::kWidestM),
+                  .q_dirlrbg = side(0),
+                  .q_dlrbg = side(1),
+                  .q_dirtrain = side(2)};
+    const double nid_lrbg = table.number_or_nan(group, etcs::kUnknownBaliseGroup);
+    if (nid_lrbg >= 0) row.nid_lrbg = static_cast<uint32_t>(nid_lrbg);
+    rows.push_back(row);
   }
   return table.status();
 }

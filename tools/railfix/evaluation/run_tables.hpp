@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "core/result.hpp"
+#include "etcs/train_position_report.hpp"
 #include "evaluation/statistics.hpp"
 #include "evaluation/time_gaps.hpp"
 
@@ -67,9 +69,14 @@ struct FixRow {
 
 struct ReportRow {
   int64_t stamp_ns = 0;
-  bool position_known = false;  // has a d_lrbg_m
+  std::optional<uint32_t> nid_lrbg{};
+  double d_lrbg_m = kUnknown;
   double doubt_over_m = 0;
   double doubt_under_m = 0;
+  uint32_t q_dirlrbg = etcs::kUnknownSide;
+  uint32_t q_dlrbg = etcs::kUnknownSide;
+  uint32_t q_dirtrain = etcs::kUnknownSide;
+  [[nodiscard]] bool position_known() const { return std::isfinite(d_lrbg_m); }
 };
 
 struct StatusRow {

@@ -12,6 +12,9 @@
 
 namespace railfix::evaluation {
 
+/// What lies so far beside the true place lies on another track: neighbours are at least 3.5 m apart.
+inline constexpr double kOwnTrackM = 2.0;
+
 /// Of time, both ends included.
 struct Stretch {
   int64_t from_ns = 0;

@@ -43,18 +43,21 @@ class Tracer {
     std::set<std::pair<int64_t, int64_t>> seen;
     size_t missing = 0;
     std::vector<int64_t> lacking;  // ways
+    std::vector<std::string> shapeless;
     for (size_t way = 0; way < data_.ways.size(); ++way) {
       const size_t missing_before = missing;
       int64_t before = 0;
       bool has_before = false;
+      bool has_length = false;
       for (const int64_t node : data_.ways[way].nodes) {
         if (!place(node)) {
           ++missing;
           has_before = false;
           continue;
         }
-        if (has_before && before != node && seen.insert(std::minmax(before, node)).second &&
-            (places_.at(before) - places_.at(node)).norm() > 0.01) {
+        const bool are_apart = has_before && (places_.at(before) - places_.at(node)).norm() > 0.01;
+        has_length = has_length || are_apart;
+        if (are_apart && seen.insert(std::minmax(before, node)).second) {
           at_node_[before].push_back(segments_.size());
           at_node_[node].push_back(segments_.size());
           segments_.push_back({before, node, way});
@@ -62,8 +65,16 @@ class Tracer {
         before = node;
         has_before = true;
       }
-      if (missing > missing_before) lacking.push_back(data_.ways[way].id);
+      if (missing > missing_before) {
+        lacking.push_back(data_.ways[way].id);
+      } else if (!has_length) {
+        shapeless.push_back("way " + std::to_string(data_.ways[way].id));
+      }
     }
+    if (!shapeless.empty())
+      out_.cuts.push_back(std::to_string(shapeless.size()) +
+                          " railway ways have no two points apart from each other; left out: " +
+                          told_list(shapeless, kMostStraysNamed));
     if (missing > 0) out_.cuts.push_back(told_missing(lacking, missing));
   }
 

@@ -185,8 +185,10 @@ class FeatureReader {
     for_each_element(features, [&](const json& feature) {
       ++number_;
       const auto geometry = feature.find("geometry");
-      if (geometry == feature.end() || !geometry->is_object() || !geometry->contains("coordinates")) return;
-      add(feature_tags(feature), geometry->value("type", ""), geometry->at("coordinates"));
+      const bool has_place = geometry != feature.end() && geometry->is_object() && geometry->contains("coordinates");
+      const OsmTags tags = feature_tags(feature);
+      if (!has_place) return tell_without_line(tags);
+      add(tags, geometry->value("type", ""), geometry->at("coordinates"));
     });
     if (on_earth_ == 0 && !elsewhere_.empty()) {
       throw core::BadInput(elsewhere_ + "; GeoJSON coordinates are longitude, latitude in degrees (WGS 84)" +
@@ -194,6 +196,10 @@ class FeatureReader {
     }
     for (const auto& [key, count] : others_)
       out_.problems.push_back(features_named(count) + " with \"" + key + "\" and no railway: no track, left out");
+    if (without_line_ > 0)
+      out_.problems.push_back(std::to_string(without_line_) +
+                              " features are railway tracks by their tags but have no line; left out: export the ways "
+                              "with their geometry");
     if (with_height_ > 0)
       out_.problems.push_back(features_named(with_height_) + " with heights, as third coordinates: these are not read");
     if (silent_lines_ > 0)
@@ -201,7 +207,13 @@ class FeatureReader {
   }
 
  private:
+  void tell_without_line(const OsmTags& tags) {
+    if (is_track(tags, with_trams_)) ++without_line_;
+  }
+
   void add(const OsmTags& tags, const std::string& type, const json& coordinates) {
+    const bool is_line = type == "LineString" || (type == "MultiLineString" && !coordinates.empty());
+    if (!is_line) tell_without_line(tags);
     if (type == "Point") {
       const GeoPoint place = place_in(coordinates);
       if (takes(place)) {
@@ -276,6 +288,7 @@ class FeatureReader {
   size_t number_ = 0;  // of the feature that is read, from 1
   std::map<std::string, size_t> others_;
   size_t silent_lines_ = 0;
+  size_t without_line_ = 0;
   size_t with_height_ = 0;
   size_t on_earth_ = 0;
   std::string elsewhere_;  // the first time that a point was not

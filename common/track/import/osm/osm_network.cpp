@@ -7,6 +7,7 @@
 #include "track/import/fit/biarc.hpp"
 #include "track/import/fit/plane.hpp"
 #include "track/import/osm/osm_chains.hpp"
+#include "track/import/osm/osm_crossings.hpp"
 #include "track/import/osm/osm_heights.hpp"
 #include "track/import/osm/osm_node_marks.hpp"
 #include "track/import/osm/osm_onward.hpp"
@@ -50,6 +51,7 @@ class Builder {
     for (const auto& [node, ends] : ends_) agree_on_tangents(ends);
     const OsmOnward onward(data_, chains_);
     for (const OsmChain& chain : chains_) add_edge(chain, onward);
+    judge_crossings(data_, chains_, out_.draft, out_.problems);
     add_heights(data_, chains_, out_.draft, out_.problems);
     add_marks_at_nodes(data_, chains_, out_.draft, points_);
     add_trackside();

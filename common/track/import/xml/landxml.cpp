@@ -327,8 +327,11 @@ class LandXmlReader {
 
   void read_alignment(const pugi::xml_node& node) {
     const pugi::xml_node geometry = node.child("CoordGeom");
-    if (!geometry) return;
     const std::string name = node.attribute("name").as_string("alignment");
+    if (!geometry) {
+      problem(name + " in line " + source_.line_of(node) + " has no <CoordGeom>; it is left out");
+      return;
+    }
     Plan plan;
     plan.stations.push_back({source_.number(node, "staStart").value_or(0.0), 0.0});
     for (const pugi::xml_node& element : geometry.children()) {
