@@ -148,7 +148,7 @@ export interface RecorderStatus {
   ring_s: number;
   kept_mb: number;
   quota_mb: number;
-  disk_free_mb: number;
+  disk_free_mb: number | null;
   files: number;
   protected_files: number;
   state: "stopped" | "recording" | "paused" | "waiting";
