@@ -51,6 +51,12 @@ bool ServiceBoard::note_silence_now_and_then(int64_t now_ns) {
   return false;
 }
 
+void ServiceBoard::forget_stopped(int64_t before_ns, const std::function<bool(const Key&)>& keep) {
+  std::erase_if(services_, [&](const auto& entry) {
+    return entry.second.stopped() && entry.second.received_ns < before_ns && !keep(entry.first);
+  });
+}
+
 const ServiceSeen* ServiceBoard::find(const std::string& service) const {
   const ServiceSeen* best = nullptr;
   for (const auto& [key, seen] : services_) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -39,6 +40,8 @@ class ServiceBoard {
   bool note_silence(int64_t now_ns);
   /// The same for who comes by all the time: looks no more often than kLookNs.
   bool note_silence_now_and_then(int64_t now_ns);
+  /// Who stopped in good order before this time, unless it is to be kept.
+  void forget_stopped(int64_t before_ns, const std::function<bool(const Key&)>& keep);
   [[nodiscard]] const std::map<Key, ServiceSeen>& services() const { return services_; }
   /// On whichever host; nullptr = never seen.
   [[nodiscard]] const ServiceSeen* find(const std::string& service) const;

@@ -98,6 +98,12 @@ void LiveApi::publish_picture(const std::string& kind, const json& message, cons
   send({std::make_shared<const std::string>(std::move(bytes)), true, kind + " picture", false}, kind);
 }
 
+void LiveApi::tell_all(const std::string& kind, const json& message) {
+  Frame frame = frame_of(message);
+  frame.slot = kind;
+  for (const auto& [id, watcher] : clients_) watcher.client->send(frame);
+}
+
 void LiveApi::reply(uint64_t client, const json& id, bool done, const std::string& text) {
   const auto watcher = clients_.find(client);
   if (watcher == clients_.end()) return;

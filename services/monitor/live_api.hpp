@@ -42,6 +42,8 @@ class LiveApi {
   /// The message, then the picture as a binary frame with its header.
   void publish_picture(const std::string& kind, const nlohmann::json& message, const nlohmann::json& header,
                        std::string_view jpeg);
+  /// To every client, whatever it watches.
+  void tell_all(const std::string& kind, const nlohmann::json& message);
   void reply(uint64_t client, const nlohmann::json& id, bool done, const std::string& text);
 
  private:

@@ -192,16 +192,16 @@ json report_message(const msg::TrainPositionReport& report) {
           {"hex", etcs::to_hex(messaging::bytes_of(report))}};
 }
 
-json problems_message(const std::vector<Problem>& problems) {
+json problems_message(const std::vector<Problem>& problems, int64_t now_ns, int64_t wall_ns) {
   json shown = json::array();
   for (const auto& problem : problems) {
     shown.push_back({{"id", problem.id},
                      {"level", problem.level == Level::error ? "error" : "warning"},
                      {"what", problem.what},
                      {"what_to_do", problem.what_to_do},
-                     {"since_ns", problem.since_ns}});
+                     {"since_ns", wall_ns - (now_ns - problem.since_ns)}});
   }
-  return {{"kind", "problems"}, {"problems", std::move(shown)}};
+  return {{"kind", "problems"}, {"now_ns", wall_ns}, {"problems", std::move(shown)}};
 }
 
 }  // namespace railfix::monitor

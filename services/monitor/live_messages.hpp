@@ -34,6 +34,6 @@ nlohmann::json state_message(const msg::TrainState& state, double age_s, const m
                              const msg::PositionFix* choice, const track::Map* map);
 
 nlohmann::json report_message(const msg::TrainPositionReport& report);
-nlohmann::json problems_message(const std::vector<Problem>& problems);
+nlohmann::json problems_message(const std::vector<Problem>& problems, int64_t now_ns, int64_t wall_ns);
 
 }  // namespace railfix::monitor

@@ -89,17 +89,49 @@ void add_topics(Families& families, const MetricsInput& input) {
   }
 }
 
+void add_expected(Families& families, const TrainSeen& seen) {
+  if (seen.played) return;  // a player stands in for all services
+  for (const auto& [service, host] : seen.expected) {
+    Labels labels{{"service", service}};
+    if (!host.empty()) labels.push_back({"host", host});
+    families.gauge("railfix_service_expected", "1: it must be there, on this host if one is named.", 1, labels);
+  }
+}
+
+// What a service that is silent said last of itself is not so any more.
+void add_work(Families& families, const msg::ServiceStatus& status, bool runs, const Labels& labels) {
+  families.gauge("railfix_service_cpu_ratio", "Processor cores in use.", runs ? status.cpu_percent() / 100 : kNaN,
+                 labels);
+  families.gauge("railfix_service_resident_bytes", "Memory in use.", runs ? status.rss_mb() * 1e6 : kNaN, labels);
+  for (const auto& [percentile, ms] :
+       {std::pair{"50", status.latency_p50_ms()}, std::pair{"99", status.latency_p99_ms()}}) {
+    Labels with_percentile = labels;
+    with_percentile.push_back({"percentile", percentile});
+    families.gauge("railfix_service_latency_seconds",
+                   "From the grab of the input to the output, over the last second; NaN = none was measured.",
+                   runs && ms > 0 ? ms / 1e3 : kNaN, with_percentile);
+  }
+}
+
 void add_services(Families& families, const TrainSeen& seen) {
+  add_expected(families, seen);
   for (const auto& [key, service] : seen.services->services()) {
     const Labels labels{{"service", service.name()}, {"host", key.first}};
     const auto& status = service.status;
-    families.gauge("railfix_service_up", "1: it shows signs of life and has neither failed nor been stopped.",
-                   service.alive && !service.stopped() && status.state() != msg::STATE_FAILED ? 1 : 0, labels);
+    const bool runs = service.alive && !service.stopped();
+    if (!service.stopped() || seen.needs(key)) {
+      families.gauge("railfix_service_up",
+                     "1: it shows signs of life and has neither failed nor been stopped. Not of one that was stopped "
+                     "and is not needed.",
+                     runs && status.state() != msg::STATE_FAILED ? 1 : 0, labels);
+    }
     for (uint8_t state = msg::STATE_STARTING; state <= msg::STATE_STOPPED; ++state) {
       Labels with_state = labels;
       with_state.push_back({"state", messaging::name_of_state(state)});
-      families.gauge("railfix_service_state", "1 for the state that the service is in, 0 for all others.",
-                     status.state() == state ? 1 : 0, with_state);
+      const bool known = runs || service.stopped();
+      families.gauge("railfix_service_state",
+                     "1 for the state that the service is in, 0 for all others, and for all when it is silent.",
+                     known && status.state() == state ? 1 : 0, with_state);
     }
     families.gauge("railfix_service_heartbeat_age_seconds", "Since the last status.",
                    core::seconds(seen.now_ns - service.received_ns), labels);
@@ -107,37 +139,40 @@ void add_services(Families& families, const TrainSeen& seen) {
     families.counter("railfix_service_outputs_total", "Output samples sent.", status.frames_out(), labels);
     families.counter("railfix_service_dropped_total", "Inputs that were lost or came too late.", status.dropped(),
                      labels);
-    families.gauge("railfix_service_cpu_ratio", "Processor cores in use.", status.cpu_percent() / 100, labels);
-    families.gauge("railfix_service_resident_bytes", "Memory in use.", status.rss_mb() * 1e6, labels);
-    for (const auto& [percentile, ms] :
-         {std::pair{"50", status.latency_p50_ms()}, std::pair{"99", status.latency_p99_ms()}}) {
-      Labels with_percentile = labels;
-      with_percentile.push_back({"percentile", percentile});
-      families.gauge("railfix_service_latency_seconds",
-                     "From the grab of the input to the output, over the last second.", ms / 1e3, with_percentile);
-    }
+    add_work(families, status, runs, labels);
   }
 }
 
 void add_position(Families& families, const MetricsInput& input) {
   families.counter("railfix_position_reports_total", "Position reports since the monitor began.", input.reports);
-  if (!input.seen->state) return;
-  const auto& state = *input.seen->state;
-  families.gauge("railfix_position_age_seconds", "Since the last train_state.", input.seen->state_age_s);
+  const auto& seen = *input.seen;
+  if (seen.state || seen.awaited_s) {
+    families.gauge("railfix_position_age_seconds",
+                   "Since the last train_state; before the first since fusion is there.",
+                   seen.state ? seen.state_age_s : *seen.awaited_s);
+  }
+  if (!seen.state) return;
   families.gauge("railfix_position_behind_seconds",
-                 "How old the last train_state was already when it came, by its stamp; NaN for played data.",
-                 input.seen->state_behind_s.value_or(kNaN));
-  families.gauge("railfix_position_over_meters", "The train may be this far behind its estimate.", state.over_m());
-  families.gauge("railfix_position_under_meters", "The train may be this far before its estimate.", state.under_m());
-  families.gauge("railfix_position_since_reference_meters", "Travelled since the last landmark or fix.",
-                 state.since_reference_m());
-  families.gauge("railfix_position_track_known", "1: it is known which track the train is on.",
-                 state.track_known() != 0 ? 1 : 0);
-  families.gauge("railfix_position_track_probability", "That it is this track and no other.",
-                 state.track_probability());
-  families.gauge("railfix_position_integrity", "0 ok, 1 degraded, 2 unusable.", state.integrity());
-  families.gauge("railfix_train_speed_meters_per_second", "Signed, along the cab's forward axis; NaN = not known.",
-                 state.speed_mps());
+                 "How old the last train_state was already when it came, by its stamp; NaN for played data, and when "
+                 "the last one is old.",
+                 seen.position_now() ? seen.state_behind_s.value_or(kNaN) : kNaN);
+  const auto* now = seen.position_now();
+  const auto gauge = [&](const std::string& name, const std::string& help, double value) {
+    families.gauge(name, (help + "; NaN = not known, or the last train_state is old.").c_str(), now ? value : kNaN);
+  };
+  const auto& state = *seen.state;
+  gauge("railfix_position_over_meters", "The train may be this far behind its estimate", state.over_m());
+  gauge("railfix_position_under_meters", "The train may be this far before its estimate", state.under_m());
+  gauge("railfix_position_since_reference_meters", "Travelled since the last landmark or fix",
+        state.since_reference_m());
+  const bool on_map = seen.on_map();
+  gauge("railfix_position_track_known", "1: it is known which track the train is on; NaN without a map",
+        !on_map                    ? kNaN
+        : state.track_known() != 0 ? 1
+                                   : 0);
+  gauge("railfix_position_track_probability", "That it is this track and no other", state.track_probability());
+  gauge("railfix_position_integrity", "0 ok, 1 degraded, 2 unusable", state.integrity());
+  gauge("railfix_train_speed_meters_per_second", "Signed, along the cab's forward axis", state.speed_mps());
 }
 
 void add_recorder(Families& families, const msg::RecorderStatus& recorder) {

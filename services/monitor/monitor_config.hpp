@@ -52,7 +52,8 @@ struct MonitorConfig {
     fields.number("slow_client_s", slow_client_s, {1, 600}, "s",
                   "A viewer that takes nothing for this time is disconnected.");
     fields.integer("most_clients", most_clients, {1, 10000}, "", "Viewers at a time; more are refused.");
-    fields.list("expected", expected, "Services that must be there; a missing one is a problem.");
+    fields.list("expected", expected,
+                "Services that must be there, SERVICE or SERVICE@HOST; a missing one is a problem.");
     fields.number("interval_wide_m", interval_wide_m, {0.1, 100000}, "m",
                   "A confidence interval wider than this is a problem.");
     fields.number("disk_low_mb", disk_low_mb, {0, 1e7}, "MB",

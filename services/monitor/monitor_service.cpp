@@ -24,6 +24,8 @@ constexpr int64_t kScrapeNs = 60 * core::kNsPerSecond;
 // Readers go away this long after the last one looked, so that opening a page anew makes none.
 constexpr int64_t kLingerNs = 10 * core::kNsPerSecond;
 constexpr auto kBeat = 50ms;
+// So long a service is told that stopped and that nobody needs.
+constexpr int64_t kStoppedShownNs = 120 * core::kNsPerSecond;
 
 std::filesystem::path page_folder(const std::string& configured) {
   if (!configured.empty()) return configured;
@@ -90,6 +92,7 @@ MonitorService::MonitorService(const Config& config, service::Context& context)
 void MonitorService::restart() {
   state_ = {};
   state_sent_ns_ = 0;
+  if (awaits_since_ns_) awaits_since_ns_ = core::monotonic_ns();
   pose_ = {};
   choice_ = {};
   gnss_ = {};
@@ -110,8 +113,10 @@ void MonitorService::start_timers() {
     written_ = context_.participant().written_topics();
     show_channels();
     choose_topics();
+    forget_stopped();
     look_for_problems();
     publish_topics();
+    publish_beat();
     give_up_waiting();
     context_.health().dropped(watch_.take_dropped());
     if (state_.age_s(core::monotonic_ns()) > 1) publish_state();
@@ -132,7 +137,10 @@ void MonitorService::beat() {
 
 void MonitorService::set_up_topics() {
   on_topic_["service_status"] = [this](const Arrived& arrived) {
-    services_.note(arrived.as<msg::ServiceStatus>(), arrived.info.arrived_ns, arrived.info.writer);
+    const auto& status = arrived.as<msg::ServiceStatus>();
+    services_.note(status, arrived.info.arrived_ns, arrived.info.writer);
+    if (!awaits_since_ns_ && std::string(status.service().c_str()) == "fusion")
+      awaits_since_ns_ = arrived.info.arrived_ns;
   };
   const auto keep = [this]<class T>(const messaging::Topic<T>& topic, Newest<T>& newest) {
     on_topic_[topic.name] = [&newest](const Arrived& arrived) { newest.take(arrived); };
@@ -300,7 +308,7 @@ TrainSeen MonitorService::train_seen() {
   train.now_ns = core::monotonic_ns();
   train.watched_since_ns = begun_ns_;
   train.services = &services_;
-  train.expected = config_.expected;
+  for (const auto& name : config_.expected) train.expected.push_back(Expected::of(name));
   for (const auto& [name, topic] : watch_.topics()) {
     if (!topic.reader) continue;
     train.topics.push_back({name, topic.statistics.numbers(train.now_ns), topic.statistics.usual_gap_s(),
@@ -308,6 +316,8 @@ TrainSeen MonitorService::train_seen() {
   }
   train.state = state_.sample;
   train.state_age_s = state_.age_s(train.now_ns);
+  if (!state_.sample && awaits_since_ns_) train.awaited_s = core::seconds(train.now_ns - *awaits_since_ns_);
+  train.no_map = !map_;
   if (state_.sample && is_live()) train.state_behind_s = state_.behind_s();
   if (recent(recorder_)) train.recorder = recorder_.sample;
   if (recent(gnss_)) train.gnss = gnss_.sample;
@@ -342,8 +352,13 @@ void MonitorService::publish_services() {
 
 void MonitorService::look_for_problems() {
   looked_ = true;
-  if (!problems_.update(find_problems(train_seen()), core::wall_ns())) return;
-  live_.publish("problems", problems_message(problems_.problems()));
+  if (!problems_.update(find_problems(train_seen()), core::monotonic_ns())) return;
+  for (const auto& message : first("problems")) live_.publish("problems", message);
+}
+
+void MonitorService::forget_stopped() {
+  const auto train = train_seen();
+  services_.forget_stopped(train.now_ns - kStoppedShownNs, [&](const auto& key) { return train.needs(key); });
 }
 
 }  // namespace railfix::monitor

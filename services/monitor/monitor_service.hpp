@@ -62,6 +62,7 @@ class MonitorService {
   void look_for_silence();
   void publish_services();
   void look_for_problems();
+  void forget_stopped();
 
   // monitor_shows.cpp: what is said to those who look
   [[nodiscard]] std::optional<track::EdgePosition> place() const;
@@ -70,6 +71,7 @@ class MonitorService {
   void publish_pictures();
   void publish_state();
   void publish_topics();
+  void publish_beat();
   [[nodiscard]] nlohmann::json curvature_message() const;
   [[nodiscard]] nlohmann::json status_message(const std::string& kind, const messaging::TopicInfo& info,
                                               const void* sample) const;
@@ -103,7 +105,8 @@ class MonitorService {
 
   messaging::ServiceBoard services_;  // by the monotonic clock, as all times here
   Newest<msg::TrainState> state_;
-  int64_t state_sent_ns_ = 0;  // arrival of the one last published
+  int64_t state_sent_ns_ = 0;               // arrival of the one last published
+  std::optional<int64_t> awaits_since_ns_;  // the first state: since fusion was heard, or the data began anew
   Newest<msg::TrainPose> pose_;
   Newest<msg::PositionFix> choice_;
   Newest<msg::GnssFix> gnss_;

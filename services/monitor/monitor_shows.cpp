@@ -74,6 +74,14 @@ void MonitorService::publish_topics() {
   for (const auto& message : first("topics")) live_.publish("topics", message);
 }
 
+// So that a page which asks for little, too, knows that it is heard, how late and from which time of day; and which
+// cameras there are.
+void MonitorService::publish_beat() {
+  live_.tell_all(
+      "beat",
+      {{"kind", "beat"}, {"sent_ns", core::monotonic_ns()}, {"now_ns", core::wall_ns()}, {"cameras", cameras()}});
+}
+
 json MonitorService::status_message(const std::string& kind, const messaging::TopicInfo& info,
                                     const void* sample) const {
   cdr::DecodeOptions options;
@@ -129,7 +137,7 @@ std::vector<json> MonitorService::first(const std::string& kind) {
   if (kind == "reports") return reports_.messages();
   if (kind == "problems") {
     if (!looked_) look_for_problems();
-    return {problems_message(problems_.problems())};
+    return {problems_message(problems_.problems(), now_ns, core::wall_ns())};
   }
   if (kind == "recorder" && recent(recorder_)) {
     return {status_message(kind, messaging::info_of(topics::recorder_status), &*recorder_.sample)};

@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <set>
 
@@ -29,7 +30,20 @@ const std::set<std::string>& flowing_topics() {
 
 using Problems = std::vector<Problem>;
 
-void judge_services(const TrainSeen& train, Problems& problems) {
+bool is_heard(const messaging::ServiceBoard& board, const Expected& wanted) {
+  return std::ranges::any_of(board.services(), [&](const auto& entry) {
+    return entry.first.second == wanted.service && (wanted.host.empty() || entry.first.first == wanted.host);
+  });
+}
+
+bool runs_elsewhere(const TrainSeen& train, const messaging::ServiceBoard::Key& key) {
+  return std::ranges::any_of(train.services->services(), [&](const auto& entry) {
+    return entry.first.second == key.second && entry.first.first != key.first && entry.second.alive &&
+           !entry.second.stopped();
+  });
+}
+
+void judge_missing(const TrainSeen& train, Problems& problems) {
   const bool starting = core::seconds(train.now_ns - train.watched_since_ns) < kStartS;
   const auto is_other = [](const auto& entry) { return entry.first.second != "monitor"; };
   const bool nobody = std::ranges::none_of(train.services->services(), is_other);
@@ -37,37 +51,58 @@ void judge_services(const TrainSeen& train, Problems& problems) {
     problems.push_back({"nobody", Level::warning, "No service of this train has been heard yet",
                         "Its services are found within seconds; if not, see that train_id and domain are theirs."});
   }
-  for (const std::string& name : train.expected) {
-    if (train.played || starting || train.services->find(name) != nullptr) continue;
-    problems.push_back({"missing " + name, Level::error, name + " is not there",
-                        "Start railfix-" + name + ", or take it out of monitor.expected."});
+  if (train.played || starting) return;
+  for (const auto& wanted : train.expected) {
+    if (is_heard(*train.services, wanted)) continue;
+    const std::string on_host = wanted.service + (wanted.host.empty() ? "" : " on " + wanted.host);
+    std::string program = "railfix-" + wanted.service;
+    std::ranges::replace(program, '_', '-');
+    problems.push_back(
+        {"missing " + on_host, Level::error, on_host + " is not there",
+         "Start it (railfix train up, or its program " + program + "), or take it out of monitor.expected."});
   }
-  for (const auto& [key, seen] : train.services->services()) {
-    const std::string name = seen.name();
-    const std::string id = key.first + "/" + name;
-    const std::string on_host = train.services->find(name) == &seen ? name : name + " on " + key.first;
-    const std::string reason = seen.status.reason().c_str();
-    const double silent_s = core::seconds(train.now_ns - seen.received_ns);
-    if (seen.stopped()) {
-      const bool is_expected = std::ranges::find(train.expected, name) != train.expected.end();
-      problems.push_back({"stopped " + id, is_expected ? Level::error : Level::warning, on_host + " was stopped",
-                          "Start it again when it is needed."});
-    } else if (!seen.alive) {
-      problems.push_back({"silent " + id, Level::error, on_host + " is dead or frozen: no sign of life",
-                          "Look at the last lines of its log, then start it again."});
-    } else if (seen.status.state() == msg::STATE_FAILED) {
-      problems.push_back({"failed " + id, Level::error, on_host + " has failed: " + reason,
-                          "Mend what it says, then start it again."});
-    } else if (name == "recorder" && reason.starts_with(kRecorderLoses) && train.recorder) {
-      continue;  // judge_recorder() says it
-    } else if (seen.status.state() == msg::STATE_DEGRADED) {
-      problems.push_back({"degraded " + id, Level::warning, on_host + " works with less: " + reason,
-                          "See to what it says; its README says what each is and when it ends."});
-    } else if (silent_s > kSilentS && !train.data_stands) {
-      problems.push_back({"late " + id, Level::warning, on_host + " has said nothing lately",
-                          "The computer or the network is overloaded: look at its processor load."});
-    }
+}
+
+// Numbers that only grow make no other problem.
+std::string without_digits(std::string text) {
+  std::erase_if(text, [](unsigned char c) { return std::isdigit(c) != 0; });
+  return text;
+}
+
+void judge_service(const TrainSeen& train, const messaging::ServiceBoard::Key& key, const messaging::ServiceSeen& seen,
+                   Problems& problems) {
+  const std::string name = seen.name();
+  const std::string id = key.first + "/" + name;
+  const std::string on_host = train.services->find(name) == &seen ? name : name + " on " + key.first;
+  const std::string reason = seen.status.reason().c_str();
+  const double silent_s = core::seconds(train.now_ns - seen.received_ns);
+  if (seen.stopped()) {
+    problems.push_back({"stopped " + id, train.needs(key) ? Level::error : Level::warning, on_host + " was stopped",
+                        "Start it again when it is needed."});
+  } else if (!seen.alive) {
+    problems.push_back({"silent " + id, Level::error, on_host + " is dead or frozen: no sign of life",
+                        std::string("Look at the last lines of its log, then start it again.") +
+                            (runs_elsewhere(train, key) ? " If it has moved to another host for good, start the "
+                                                          "monitor again, which then forgets this one."
+                                                        : "")});
+  } else if (seen.status.state() == msg::STATE_FAILED) {
+    problems.push_back(
+        {"failed " + id, Level::error, on_host + " has failed: " + reason, "Mend what it says, then start it again."});
+  } else if (name == "recorder" && reason.starts_with(kRecorderLoses) && train.recorder) {
+    return;  // judge_recorder() says it
+  } else if (seen.status.state() == msg::STATE_DEGRADED) {
+    problems.push_back({"degraded " + id + ": " + without_digits(reason), Level::warning,
+                        on_host + " works with less: " + reason,
+                        "See to what it says; its README says what each is and when it ends."});
+  } else if (silent_s > kSilentS && !train.data_stands) {
+    problems.push_back({"late " + id, Level::warning, on_host + " has said nothing lately",
+                        "The computer or the network is overloaded: look at its processor load."});
   }
+}
+
+void judge_services(const TrainSeen& train, Problems& problems) {
+  judge_missing(train, problems);
+  for (const auto& [key, seen] : train.services->services()) judge_service(train, key, seen, problems);
 }
 
 void judge_topics(const TrainSeen& train, Problems& problems) {
@@ -82,8 +117,44 @@ void judge_topics(const TrainSeen& train, Problems& problems) {
   }
 }
 
+void judge_silence_of_fusion(const TrainSeen& train, Problems& problems) {
+  const auto* fusion = train.services->find("fusion");
+  const bool runs = fusion != nullptr && fusion->alive && !fusion->stopped();  // otherwise that is the problem
+  if (train.played || !runs || train.awaited_s.value_or(0) < kStartS) return;
+  problems.push_back({"no position", Level::error, "No position of this train has been heard yet",
+                      "See what fusion says, and whether camera, odometry and sensors give anything."});
+}
+
+void judge_place(const TrainSeen& train, const msg::TrainState& state, Problems& problems) {
+  if (!train.on_map()) {
+    problems.push_back({"map", Level::warning, "This train has no map: distance and speed, but no position",
+                        "Give it one (map of the train, or fusion.map and monitor.map)."});
+  } else if (state.track_known() == 0) {
+    problems.push_back(
+        {"track", Level::warning,
+         "It is not known which track the train is on" +
+             (state.edge() == 0
+                  ? ""
+                  : fmt::format(" ({:.1f} % for edge {})", 100 * state.track_probability(), state.edge())),
+         "It becomes known behind the next switch, curve or balise; if not, see what map_matcher says."});
+  } else if (const double wide_m = state.over_m() + state.under_m(); wide_m > train.interval_wide_m) {
+    problems.push_back({"wide", Level::warning,
+                        std::isfinite(wide_m) ? fmt::format("The confidence interval is {:.0f} m wide", wide_m)
+                                              : "The confidence interval has no bound",
+                        "The next landmark on the map narrows it; if none comes, see whether the camera sees them."});
+  }
+}
+
+std::string reason_of_fusion(const TrainSeen& train) {
+  const auto* fusion = train.services->find("fusion");
+  return fusion == nullptr || !fusion->alive ? "" : fusion->status.reason().c_str();
+}
+
 void judge_position(const TrainSeen& train, Problems& problems) {
-  if (!train.state || train.data_stands) return;
+  if (train.data_stands) return;
+  if (!train.state) return judge_silence_of_fusion(train, problems);
+  const auto* state = train.position_now();
+  if (state == nullptr) return;  // that its service or its topic is silent is said
   if (train.state_behind_s && *train.state_behind_s > kBehindS) {
     problems.push_back(
         {"behind", Level::error,
@@ -92,24 +163,13 @@ void judge_position(const TrainSeen& train, Problems& problems) {
          "See the processor load of fusion's computer, and that all computers get their time from one source (NTP, "
          "PTP)."});
   }
-  const auto& state = *train.state;
-  if (state.track_known() == 0) {
-    problems.push_back(
-        {"track", Level::warning,
-         "It is not known which track the train is on" +
-             (state.edge() == 0
-                  ? ""
-                  : fmt::format(" ({:.1f} % for edge {})", 100 * state.track_probability(), state.edge())),
-         "It becomes known behind the next switch, curve or balise; if not, see what map_matcher says."});
-  } else if (state.over_m() + state.under_m() > train.interval_wide_m) {
-    problems.push_back({"wide", Level::warning,
-                        fmt::format("The confidence interval is {:.0f} m wide", state.over_m() + state.under_m()),
-                        "The next landmark on the map narrows it; if none comes, see whether the camera sees them."});
-  }
-  if (state.integrity() == msg::INTEGRITY_UNUSABLE) {
-    problems.push_back({"unusable", Level::error, "The position must not be used: its sources contradict each other",
-                        "See the reason that fusion gives, and which sensors are degraded."});
-  } else if (state.integrity() == msg::INTEGRITY_DEGRADED) {
+  judge_place(train, *state, problems);
+  const std::string reason = reason_of_fusion(train);
+  if (state->integrity() == msg::INTEGRITY_UNUSABLE) {
+    problems.push_back({"unusable", Level::error,
+                        "The position must not be used" + (reason.empty() ? "" : ": " + reason),
+                        "See which sensors and services are degraded or silent."});
+  } else if (state->integrity() == msg::INTEGRITY_DEGRADED && train.on_map()) {
     problems.push_back({"integrity", Level::warning, "The position is held by less than usual",
                         "See the reason that fusion gives, and which sensors are degraded."});
   }
@@ -129,14 +189,17 @@ void judge_recorder(const TrainSeen& train, Problems& problems) {
                         fmt::format("The recording lacks {} {} of {}", lost, lost == 1 ? "sample" : "samples", topics),
                         "See the causes in the recorder panel; record fewer pictures or use a faster disk."});
   }
-  if (recorder.disk_free_mb() > 0 && recorder.disk_free_mb() < train.disk_low_mb) {
+  if (recorder.disk_free_mb() < train.disk_low_mb) {  // NaN: cannot be told
     problems.push_back({"disk", Level::warning,
                         fmt::format("The recorder's disk has {:.0f} MB left", recorder.disk_free_mb()),
                         "Fetch recordings from it, or set recorder.quota_mb."});
   }
   if (recorder.state() == msg::RECORDER_STOPPED || recorder.state() == msg::RECORDER_PAUSED) {
+    const auto* service = train.services->find("recorder");
+    const bool cannot = service != nullptr && service->status.state() == msg::STATE_DEGRADED;
     problems.push_back(
-        {"not recording", Level::warning, "Nothing is being recorded", "Start the recorder in its panel."});
+        {"not recording", Level::warning, "Nothing is being recorded",
+         cannot ? "See to what the recorder says, then start it in its panel." : "Start the recorder in its panel."});
   }
 }
 
@@ -165,6 +228,18 @@ void judge_rest(const TrainSeen& train, Problems& problems) {
 }
 
 }  // namespace
+
+Expected Expected::of(const std::string& text) {
+  const size_t at = text.find('@');
+  return at == std::string::npos ? Expected{text, ""} : Expected{text.substr(0, at), text.substr(at + 1)};
+}
+
+bool TrainSeen::needs(const messaging::ServiceBoard::Key& key) const {
+  return std::ranges::any_of(expected, [&](const Expected& wanted) {
+    if (wanted.service != key.second) return false;
+    return wanted.host.empty() ? !runs_elsewhere(*this, key) : wanted.host == key.first;
+  });
+}
 
 std::vector<Problem> find_problems(const TrainSeen& train) {
   Problems problems;

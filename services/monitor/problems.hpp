@@ -22,8 +22,18 @@ struct Problem {
   Level level = Level::warning;
   std::string what;
   std::string what_to_do;
-  int64_t since_ns = 0;
+  int64_t since_ns = 0;  // monotonic: no clock that is set moves it
   friend bool operator==(const Problem&, const Problem&) = default;
+};
+
+/// A position that came longer ago says nothing of the train as it is now.
+inline constexpr double kPositionOldS = 2;
+
+/// A service that must be there, written SERVICE or SERVICE@HOST.
+struct Expected {
+  std::string service;
+  std::string host;  // empty = on whichever
+  static Expected of(const std::string& text);
 };
 
 /// The train as it is seen at one moment.
@@ -31,7 +41,7 @@ struct TrainSeen {
   int64_t now_ns = 0;  // of the clock that the services were noted by
   int64_t watched_since_ns = 0;
   const messaging::ServiceBoard* services = nullptr;
-  std::vector<std::string> expected;
+  std::vector<Expected> expected;
   struct Topic {
     std::string name;
     TopicNumbers numbers;
@@ -41,6 +51,8 @@ struct TrainSeen {
   std::vector<Topic> topics;  // those that are listened to
   std::optional<msg::TrainState> state;
   double state_age_s = 0;
+  std::optional<double> awaited_s;       // without a state: since fusion was first heard, or since the data began anew
+  bool no_map = false;                   // the monitor has none
   std::optional<double> state_behind_s;  // its stamp behind the wall clock when it came; live data only
   std::optional<msg::RecorderStatus> recorder;
   std::optional<msg::GnssFix> gnss;
@@ -57,6 +69,15 @@ struct TrainSeen {
   std::string keys_command = "railfix train keys TRAIN";
   double interval_wide_m = 100;
   double disk_low_mb = 1000;
+
+  /// The last one, unless it is too old to be the train's.
+  [[nodiscard]] const msg::TrainState* position_now() const {
+    return state && state_age_s < kPositionOldS ? &*state : nullptr;
+  }
+  /// Whether there is a map on which the place can be known: the monitor's, or one that only fusion has.
+  [[nodiscard]] bool on_map() const { return !no_map || (state && (state->edge() != 0 || state->track_known() != 0)); }
+  /// Whether the train lacks this service when it is not there: not if another host has it in its place.
+  [[nodiscard]] bool needs(const messaging::ServiceBoard::Key& key) const;
 };
 
 /// Without since_ns.

@@ -15,8 +15,15 @@ constexpr size_t kLatencies = 512;
 constexpr double kUsualShare = 0.1;  // of a new gap in the usual one
 constexpr double kGapFactor = 3;
 constexpr double kShortestGapS = 0.02;
+constexpr int64_t kHistoryNs = 2 * core::kNsPerSecond;
 
 }  // namespace
+
+bool BeforeListening::was_sent(const SeenSample& sample) {
+  if (!standing_) return false;
+  const int64_t met_ns = met_ns_.try_emplace(sample.writer, sample.arrived_ns).first->second;
+  return sample.arrived_ns - met_ns < kHistoryNs && sample.sent_ns() < since_ns_;
+}
 
 TopicStatistics::Slice& TopicStatistics::slice(int64_t at_ns) {
   const int64_t number = at_ns / kSliceNs;
@@ -27,11 +34,8 @@ TopicStatistics::Slice& TopicStatistics::slice(int64_t at_ns) {
 
 void TopicStatistics::add(const SeenSample& sample) {
   lost_ += sequences_.before(sample.writer, sample.sequence, exclusive_);
-  if (samples_ == 0) {
-    first_ns_ = sample.arrived_ns;
-  } else {
-    note_gap(std::max<int64_t>(sample.arrived_ns - last_ns_, 0));
-  }
+  if (samples_ == 0) first_ns_ = sample.arrived_ns;
+  note_pace(sample);
   last_ns_ = std::max(last_ns_, sample.arrived_ns);
   ++samples_;
   bytes_ += sample.bytes;
@@ -41,15 +45,28 @@ void TopicStatistics::add(const SeenSample& sample) {
   if (sample.source_ns > 0) note_latency(sample);
 }
 
-void TopicStatistics::note_gap(int64_t gap_ns) {
+void TopicStatistics::note_pace(const SeenSample& sample) {
+  Pace& pace = paces_[exclusive_ ? 0 : sample.writer];
+  const int64_t gap_ns = std::max<int64_t>(sample.arrived_ns - pace.last_ns, 0);
+  pace.last_ns = std::max(pace.last_ns, sample.arrived_ns);
+  if (pace.samples++ == 0) return;
   const double gap_s = core::seconds(gap_ns);
-  if (samples_ >= kSamplesToKnow && gap_s > std::max(kGapFactor * usual_gap_s_, kShortestGapS)) {
+  if (pace.samples > kSamplesToKnow && gap_s > std::max(kGapFactor * pace.usual_gap_s, kShortestGapS)) {
     ++gaps_;
   } else {
-    usual_gap_s_ = samples_ == 1 ? gap_s : usual_gap_s_ + kUsualShare * (gap_s - usual_gap_s_);
+    pace.usual_gap_s = pace.samples == 2 ? gap_s : pace.usual_gap_s + kUsualShare * (gap_s - pace.usual_gap_s);
   }
-  Slice& now = slice(last_ns_ + gap_ns);
+  Slice& now = slice(pace.last_ns);
   now.longest_gap_ns = std::max(now.longest_gap_ns, gap_ns);
+}
+
+double TopicStatistics::usual_gap_s() const {
+  double shortest_s = 0;
+  for (const auto& [writer, pace] : paces_) {
+    if (pace.samples < kSamplesToKnow) continue;
+    shortest_s = shortest_s == 0 ? pace.usual_gap_s : std::min(shortest_s, pace.usual_gap_s);
+  }
+  return shortest_s;
 }
 
 void TopicStatistics::note_latency(const SeenSample& sample) {

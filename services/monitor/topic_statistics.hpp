@@ -1,10 +1,11 @@
-// What one topic does, from the samples that come: rate, bandwidth, age, latency, losses and gaps. Knows no DDS. Only
-// latency is by the hosts' wall clocks; all else by the monotonic one, so that no clock that is set can hide a silence.
+// What one topic does, from the samples that come: rate, bandwidth, age, latency, losses and gaps. Knows no DDS. All is
+// by the monotonic clock, so that no clock that is set can hide a silence, but for latency and BeforeListening.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -31,7 +32,7 @@ struct TopicNumbers {
   uint64_t samples = 0;
   uint64_t bytes = 0;
   uint64_t lost = 0;  // sent, but never came here
-  uint64_t gaps = 0;  // pauses of more than three usual ones
+  uint64_t gaps = 0;  // pauses of a writer of more than three usual ones
   double hz = 0;      // over the last five seconds
   double bytes_per_s = 0;
   double longest_gap_s = 0;  // of the last minute, the present one included
@@ -40,6 +41,20 @@ struct TopicNumbers {
   double latency_p50_ms = std::numeric_limits<double>::quiet_NaN();
   double latency_p95_ms = std::numeric_limits<double>::quiet_NaN();
   double latency_p99_ms = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// Of a standing value the last samples from before one listened come, too: they say nothing about the way here. The
+/// clocks of two hosts may differ, so their stamps are asked only as long as such a sample can be on its way.
+class BeforeListening {
+ public:
+  BeforeListening() = default;
+  BeforeListening(bool standing, int64_t since_ns) : standing_(standing), since_ns_(since_ns) {}
+  bool was_sent(const SeenSample& sample);
+
+ private:
+  bool standing_ = false;
+  int64_t since_ns_ = 0;                // monotonic
+  std::map<uint64_t, int64_t> met_ns_;  // each writer's first sample here
 };
 
 class TopicStatistics {
@@ -53,8 +68,8 @@ class TopicStatistics {
     return latency_counts_;
   }
   [[nodiscard]] double latency_sum_s() const { return latency_sum_s_; }
-  /// Pause between samples as it usually is; 0 = not known yet.
-  [[nodiscard]] double usual_gap_s() const { return samples_ < kSamplesToKnow ? 0 : usual_gap_s_; }
+  /// Pause between samples of a writer as it usually is, the shortest of all writers; 0 = not known yet.
+  [[nodiscard]] double usual_gap_s() const;
 
  private:
   static constexpr uint64_t kSamplesToKnow = 10;
@@ -68,8 +83,14 @@ class TopicStatistics {
     int64_t arrived_ns = 0;
     float ms = 0;
   };
+  /// Of one writer; of all where one is heard at a time.
+  struct Pace {
+    uint64_t samples = 0;
+    int64_t last_ns = 0;
+    double usual_gap_s = 0;
+  };
   void note_latency(const SeenSample& sample);
-  void note_gap(int64_t gap_ns);
+  void note_pace(const SeenSample& sample);
   Slice& slice(int64_t at_ns);
 
   uint64_t samples_ = 0;
@@ -78,7 +99,7 @@ class TopicStatistics {
   uint64_t gaps_ = 0;
   int64_t first_ns_ = 0;
   int64_t last_ns_ = 0;
-  double usual_gap_s_ = 0;
+  std::map<uint64_t, Pace> paces_;
   std::array<Slice, 240> slices_;   // a minute, four a second
   std::vector<Latency> latencies_;  // a ring
   size_t next_latency_ = 0;

@@ -31,11 +31,11 @@ void TrainWatch::read(const std::set<std::string>& names) {
     if (topic.reader) continue;
     topic.statistics = TopicStatistics(info->qos.exclusive);
     topic.info = info;
-    topic.read_since_ns = core::monotonic_ns();
     messaging::TopicInfo lenient = *info;
     // Statuses come again before anyone has missed one; asking for one again would cost an answer to each.
     if (info->name == messaging::topics::service_status.name) lenient.qos.transient_local = false;
     if (!lenient.qos.transient_local) lenient.qos.reliable = false;
+    topic.before = BeforeListening(lenient.qos.transient_local, core::monotonic_ns());
     lenient.reader_queue = std::max(info->reader_queue, info->name == "camera_preview" ? size_t{4} : kWaiting);
     const size_t slash = name.find('/');
     topic.reader = std::make_unique<messaging::AnyReader>(
@@ -53,9 +53,8 @@ void TrainWatch::drain() {
 
 void TrainWatch::arrived(const std::string& name, Topic& topic, const std::shared_ptr<const void>& sample,
                          const messaging::SampleInfo& info) {
-  // What was sent before we listened says nothing about the way here.
   SeenSample seen{info.arrived_ns, info.received_ns, info.source_ns, info.sequence, info.writer, topic.fixed_bytes};
-  if (seen.sent_ns() >= topic.read_since_ns) {
+  if (!topic.before.was_sent(seen)) {
     if (seen.bytes == 0) {
       seen.bytes = topic.info->type->serialize(sample.get()).size();
       const auto* structure = cdr::own_types().find(topic.info->type->name());

@@ -41,9 +41,9 @@ class TrainWatch {
   struct Topic {
     const messaging::TopicInfo* info = nullptr;
     TopicStatistics statistics;
+    BeforeListening before;
     std::unique_ptr<messaging::AnyReader> reader;
-    int64_t read_since_ns = 0;  // monotonic
-    size_t fixed_bytes = 0;     // of every sample, 0 = not fixed
+    size_t fixed_bytes = 0;  // of every sample, 0 = not fixed
   };
   /// All that were ever read.
   [[nodiscard]] const std::map<std::string, Topic>& topics() const { return topics_; }

@@ -1,5 +1,7 @@
 #include "recorder/recorder_status.hpp"
 
+#include <limits>
+
 #include "core/cut_text.hpp"
 #include "core/time.hpp"
 
@@ -11,6 +13,7 @@ namespace {
 constexpr size_t kMostText = 255;
 constexpr size_t kMostTopic = 63;
 constexpr size_t kMostTopics = 64;
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 double megabytes(uint64_t bytes) {
   return static_cast<double>(bytes) / kBytesPerMb;
@@ -50,7 +53,7 @@ msg::RecorderStatus status_of(const RecorderState& state, const Survey& folder, 
   status.ring_s(state.ring_s);
   status.kept_mb(megabytes(folder.bytes));
   status.quota_mb(quota_mb);
-  status.disk_free_mb(megabytes(folder.disk_free_bytes));
+  status.disk_free_mb(folder.disk_free_bytes ? megabytes(*folder.disk_free_bytes) : kUnknown);
   status.files(folder.files);
   status.protected_files(folder.protected_files);
   status.state(state_of(state));

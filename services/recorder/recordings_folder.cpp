@@ -129,7 +129,7 @@ Survey survey(const fs::path& folder) {
     ++all.protected_files;
     all.protected_bytes += found.bytes;
   }
-  all.disk_free_bytes = disk_free(folder).value_or(0);
+  all.disk_free_bytes = disk_free(folder);
   return all;
 }
 

@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,8 +47,8 @@ struct Survey {
   uint32_t protected_files = 0;
   uint64_t bytes = 0;
   uint64_t protected_bytes = 0;
-  uint64_t event_bytes = 0;      // of recordings around events
-  uint64_t disk_free_bytes = 0;  // for this user; 0 when it cannot be told
+  uint64_t event_bytes = 0;                 // of recordings around events
+  std::optional<uint64_t> disk_free_bytes;  // for this user; nothing when it cannot be told
 };
 Survey survey(const std::filesystem::path& folder);
 

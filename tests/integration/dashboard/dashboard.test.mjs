@@ -297,7 +297,55 @@ describe("the page", { timeout: 600000 }, () => {
     await nobody.waitFor({ state: "detached" });
     await one.locator("#problems .asking", { hasText: "No position of the train has been heard yet" }).waitFor();
     assert.equal(await one.locator("#problems .fine").count(), 0);
+    await one.locator(".problem.error", { hasText: "No position of this train has been heard yet" }).waitFor();
     await picture("no-position-heard", one);
+    await one.close();
+  });
+
+  it("says that the picture is old when those that come cannot be decoded", async () => {
+    const one = await open(DESK, "light");
+    await until("the picture is live", async () => (await one.locator("#camera canvas").count()) === 1 && (await one.locator("#camera.stale").count()) === 0);
+    await one.evaluate(() => (window.createImageBitmap = () => Promise.reject(new Error("broken"))));
+    await one.locator("#camera.stale .age").waitFor();
+    await one.locator("#camera .banner", { hasText: "Old picture" }).waitFor();
+    await one.close();
+  });
+
+  it("names a slow link, and shows nothing that came over it as live", async () => {
+    const one = await chromium.newPage({ viewport: DESK });
+    let delay_ms = 0;
+    await one.routeWebSocket(/api\/live/, (socket) => {
+      const server = socket.connectToServer();
+      server.onMessage((message) => void setTimeout(() => socket.send(message), delay_ms));
+    });
+    await one.goto(train.address);
+    await until("it is live", async () => (await one.locator("#numbers:not(.stale) dl").count()) === 1);
+    delay_ms = 3000; // shorter than a silence that is a lost connection
+    await one.locator(".problem.error", { hasText: /What is shown is \d+(\.\d)?\ss old: the link to the train or this browser is slow/ }).waitFor();
+    for (const part of ["numbers", "line", "camera", "curvature"]) await one.locator(`#${part}.stale`).waitFor();
+    assert.match(await one.locator(".connection").innerText(), /Connected, .+ late/);
+    delay_ms = 0;
+    await one.locator(".problem.error", { hasText: "What is shown is" }).waitFor({ state: "detached" });
+    await one.locator("#numbers:not(.stale)").waitFor();
+    await one.close();
+  });
+
+  it("says in the title of a page in the background that nobody answers", async () => {
+    const one = await open(DESK, "light");
+    const connected = async () => /Connected/.test(await one.locator(".connection").innerText());
+    await until("it is connected", connected);
+    await one.evaluate(() => {
+      Object.defineProperty(document, "visibilityState", { value: "hidden", configurable: true });
+      document.dispatchEvent(new Event("visibilitychange"));
+    });
+    train.signal("monitor", "SIGSTOP");
+    try {
+      await until("the title says so", async () => /not connected/.test(await one.title()));
+    } finally {
+      train.signal("monitor", "SIGCONT");
+    }
+    await until("it is connected again", connected);
+    await until("the other page is, too", async () => /Connected/.test(await text(".connection")));
     await one.close();
   });
 
@@ -308,6 +356,7 @@ describe("the page", { timeout: 600000 }, () => {
     await page.locator("#numbers.stale").waitFor();
     assert.match(await text("#numbers .age"), /Not live: .+ old/);
     for (const panel of ["line", "camera"]) await page.locator(`#${panel}.stale .age`).waitFor();
+    for (const panel of ["history", "reports", "log"]) await page.locator(`#${panel}.stale`).waitFor();
     assert.match(await page.title(), /not connected/);
     assert.equal(await page.locator("#problems .fine").count(), 0);
     await picture("no-connection");
@@ -323,6 +372,7 @@ describe("the page", { timeout: 600000 }, () => {
     train.start_replay();
     const panel = page.locator("#player");
     await panel.waitFor();
+    await until("the other train is named", async () => /train replay-/.test(await text("header .train")));
     await until("the replay is live", async () => (await page.locator("#player.stale").count()) === 0 && /Playing/.test(await text("#player .aside")));
     await panel.getByRole("button", { name: "Pause" }).click();
     await until("it is paused", async () => /Paused/.test(await text("#player .aside")));

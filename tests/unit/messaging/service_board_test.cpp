@@ -28,6 +28,20 @@ TEST(ServiceBoard, KnowsSinceWhen) {
   EXPECT_EQ(board.find("fusion"), nullptr);
 }
 
+TEST(ServiceBoard, ForgetsWhoStoppedUnlessItIsNeeded) {
+  ServiceBoard board;
+  const auto forget = [&](int64_t before_ns, bool needed) {
+    board.forget_stopped(before_ns, [&](const auto&) { return needed; });
+    return board.find("odometry") == nullptr;
+  };
+  board.note(status(msg::STATE_ACTIVE), 100);
+  EXPECT_FALSE(forget(1000, false)) << "silent is not stopped";
+  board.note(status(msg::STATE_STOPPED), 200);
+  EXPECT_FALSE(forget(200, false));
+  EXPECT_FALSE(forget(1000, true));
+  EXPECT_TRUE(forget(1000, false));
+}
+
 // Looks as often as the board wants it, from the last look on; true when somebody has fallen silent.
 bool look_until(ServiceBoard& board, int64_t from_ns, int64_t until_ns) {
   bool fallen = false;

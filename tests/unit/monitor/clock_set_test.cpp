@@ -70,5 +70,14 @@ TEST(ClockSet, AServiceIsInItsStateSinceATimeOfTheClockAsItIsNow) {
   EXPECT_EQ(service["since_ns"], now.received_ns - 5'000 * kMs);
 }
 
+TEST(ClockSet, AProblemIsSinceATimeOfTheClockAsItIsNow) {
+  ProblemList list;
+  list.update({{"a", Level::warning, "a", "", 0}}, info_at(4'000 * kMs).arrived_ns);
+  const auto now = info_at(9'000 * kMs);
+  const auto message = problems_message(list.problems(), now.arrived_ns, now.received_ns);
+  EXPECT_EQ(message["now_ns"], now.received_ns);
+  EXPECT_EQ(message["problems"][0]["since_ns"], now.received_ns - 5'000 * kMs);
+}
+
 }  // namespace
 }  // namespace railfix::monitor::clock_set_test

@@ -48,6 +48,13 @@ TEST_F(LiveApiTest, SendsWhatWasAskedForAndNothingElse) {
   EXPECT_EQ(one_->resumed, 1);
 }
 
+TEST_F(LiveApiTest, TellsAllWhoWatchNothing) {
+  live_.tell_all("beat", {{"kind", "beat"}});
+  EXPECT_EQ(one_->last()["kind"], "beat");
+  EXPECT_EQ(two_->last()["kind"], "beat");
+  EXPECT_EQ(two_->frames.back().slot, "beat") << "a newer one takes its place";
+}
+
 TEST_F(LiveApiTest, ForgetsWhoLeaves) {
   live_.message(one_, R"({"watch": ["state"]})");
   live_.message(two_, R"({"watch": ["state"]})");

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "core/time.hpp"
 
 namespace railfix::monitor {
@@ -19,7 +22,7 @@ class ProblemsTest : public ::testing::Test {
     train_.now_ns = kNow_ns;
     train_.watched_since_ns = kNow_ns - 60 * core::kNsPerSecond;
     train_.services = &board_;
-    train_.expected = {"odometry", "fusion"};
+    train_.expected = {{"odometry", ""}, {"fusion", ""}};
     for (const char* name : {"odometry", "fusion"}) board_.note(status(name, msg::STATE_ACTIVE), kNow_ns);
     train_.state.emplace();
     train_.state->track_known(1);
@@ -29,10 +32,11 @@ class ProblemsTest : public ::testing::Test {
     numbers.age_s = 0.02;
     train_.topics.push_back({"odometry_step", numbers, 0.02, true});
   }
-  static msg::ServiceStatus status(const std::string& name, uint8_t state, const std::string& reason = "") {
+  static msg::ServiceStatus status(const std::string& name, uint8_t state, const std::string& reason = "",
+                                   const std::string& host = "cab") {
     msg::ServiceStatus made;
     made.service(name);
-    made.host("cab");
+    made.host(host);
     made.state(state);
     made.reason(reason);
     return made;
@@ -52,7 +56,7 @@ TEST_F(ProblemsTest, AWellTrainHasNone) {
 }
 
 TEST_F(ProblemsTest, NamesServicesThatAreMissingDeadOrDegraded) {
-  train_.expected.push_back("recorder");
+  train_.expected.push_back({"recorder", ""});
   EXPECT_EQ(only().what, "recorder is not there");
   train_.watched_since_ns = kNow_ns;
   EXPECT_THAT(find_problems(train_), IsEmpty()) << "it may still be starting";
@@ -72,6 +76,81 @@ TEST_F(ProblemsTest, NamesServicesThatAreMissingDeadOrDegraded) {
   EXPECT_EQ(only().level, Level::warning);
 }
 
+TEST_F(ProblemsTest, NamesTheProgramOfAMissingService) {
+  train_.expected.push_back({"frame_grabber", ""});
+  EXPECT_THAT(only().what_to_do, HasSubstr("railfix-frame-grabber"));
+}
+
+TEST_F(ProblemsTest, MissesAStandbyOnItsHost) {
+  train_.expected = {Expected::of("odometry"), Expected::of("fusion@cab"), Expected::of("fusion@coach")};
+  EXPECT_EQ(only().what, "fusion on coach is not there");
+  board_.note(status("fusion", msg::STATE_ACTIVE, "", "coach"), kNow_ns);
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+  board_.note(status("fusion", msg::STATE_STOPPED, "", "coach"), kNow_ns);
+  EXPECT_EQ(only().level, Level::error) << "the other host does not stand in for it";
+}
+
+TEST_F(ProblemsTest, AServiceThatMovedIsNoError) {
+  board_.note(status("odometry", msg::STATE_STOPPED), kNow_ns);
+  EXPECT_EQ(only().level, Level::error);
+  board_.note(status("odometry", msg::STATE_ACTIVE, "", "coach"), kNow_ns);
+  EXPECT_THAT(only().what, HasSubstr("was stopped"));
+  EXPECT_EQ(only().level, Level::warning);
+  EXPECT_FALSE(train_.needs({"cab", "odometry"}));
+  EXPECT_TRUE(train_.needs({"cab", "fusion"}));
+}
+
+// What it is since belongs to the reason that is shown.
+TEST_F(ProblemsTest, AnotherReasonIsAnotherProblem) {
+  board_.note(status("fusion", msg::STATE_DEGRADED, "no camera for 3 s"), kNow_ns);
+  const auto first = only().id;
+  board_.note(status("fusion", msg::STATE_DEGRADED, "no camera for 4 s"), kNow_ns);
+  EXPECT_EQ(only().id, first);
+  board_.note(status("fusion", msg::STATE_DEGRADED, "no camera for 5 s; nothing measures the motion"), kNow_ns);
+  EXPECT_NE(only().id, first);
+}
+
+TEST_F(ProblemsTest, SaysThatNoPositionComes) {
+  train_.state.reset();
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+  train_.awaited_s = 9;
+  EXPECT_THAT(find_problems(train_), IsEmpty()) << "it may still be starting";
+  train_.awaited_s = 11;
+  EXPECT_EQ(only().what, "No position of this train has been heard yet");
+  EXPECT_EQ(only().level, Level::error);
+  train_.data_stands = true;
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+  train_.data_stands = false;
+  board_.note(status("fusion", msg::STATE_STOPPED), kNow_ns);
+  EXPECT_EQ(only().what, "fusion was stopped") << "one cause, one sentence";
+}
+
+// What a dead fusion said last is not so now; that it is silent is said.
+TEST_F(ProblemsTest, JudgesNoPositionThatIsOld) {
+  train_.state->track_known(0);
+  train_.state->integrity(msg::INTEGRITY_UNUSABLE);
+  train_.state_behind_s = 3;
+  EXPECT_EQ(find_problems(train_).size(), 3U);
+  train_.state_age_s = 2.5;
+  EXPECT_THAT(find_problems(train_), IsEmpty());
+}
+
+TEST_F(ProblemsTest, ATrainWithoutAMapLacksTheMapAndNothingElse) {
+  train_.no_map = true;
+  train_.state->track_known(0);
+  train_.state->integrity(msg::INTEGRITY_DEGRADED);
+  EXPECT_THAT(only().what, HasSubstr("This train has no map"));
+  train_.state->edge(3);  // fusion has one
+  EXPECT_THAT(find_problems(train_).front().what, HasSubstr("not known which track"));
+}
+
+TEST_F(ProblemsTest, GivesFusionsReasonWhyThePositionMustNotBeUsed) {
+  train_.state->integrity(msg::INTEGRITY_UNUSABLE);
+  EXPECT_EQ(only().what, "The position must not be used");
+  board_.note(status("fusion", msg::STATE_DEGRADED, "nothing measures the motion"), kNow_ns);
+  EXPECT_EQ(find_problems(train_).back().what, "The position must not be used: nothing measures the motion");
+}
+
 TEST_F(ProblemsTest, SaysThatNobodyWasHeardYet) {
   messaging::ServiceBoard empty;
   train_.services = &empty;
@@ -89,7 +168,7 @@ TEST_F(ProblemsTest, APausedRecordingIsNone) {
   train_.data_stands = true;
   EXPECT_THAT(find_problems(train_), IsEmpty());
   train_.played = true;
-  train_.expected.push_back("recorder");
+  train_.expected.push_back({"recorder", ""});
   EXPECT_THAT(find_problems(train_), IsEmpty()) << "a player stands in for all services";
 }
 
@@ -107,6 +186,9 @@ TEST_F(ProblemsTest, TellsWhatIsWrongWithThePosition) {
   train_.state->over_m(90);
   train_.state->under_m(40);
   EXPECT_THAT(only().what, HasSubstr("130 m wide"));
+  train_.state->under_m(std::numeric_limits<double>::infinity());
+  EXPECT_THAT(only().what, HasSubstr("has no bound"));
+  train_.state->under_m(40);
   train_.state->track_known(0);
   EXPECT_THAT(only().what, HasSubstr("not known which track"));
   train_.state->track_known(1);
@@ -158,9 +240,16 @@ TEST_F(ProblemsTest, TellsOfRecorderSatellitesAndSharedMemory) {
   train_.recorder->lost({});
   train_.recorder->disk_free_mb(300);
   EXPECT_THAT(only().what, HasSubstr("300 MB"));
-  train_.recorder->disk_free_mb(50'000);
+  train_.recorder->disk_free_mb(0);
+  EXPECT_THAT(only().what, HasSubstr(" 0 MB"));
+  train_.recorder->disk_free_mb(std::nan(""));
+  EXPECT_THAT(find_problems(train_), IsEmpty()) << "it cannot be told";
   train_.recorder->state(msg::RECORDER_STOPPED);
   EXPECT_EQ(only().what, "Nothing is being recorded");
+  EXPECT_EQ(only().what_to_do, "Start the recorder in its panel.");
+  board_.note(status("recorder", msg::STATE_DEGRADED, "the disk is full"), kNow_ns);
+  EXPECT_THAT(find_problems(train_).back().what_to_do, HasSubstr("See to what the recorder says"));
+  board_.note(status("recorder", msg::STATE_ACTIVE), kNow_ns);
   train_.recorder.reset();
   train_.gnss.emplace();
   train_.gnss->fix(msg::GNSS_NONE);

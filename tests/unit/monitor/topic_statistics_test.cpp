@@ -66,6 +66,38 @@ TEST(TopicStatistics, NothingIsLostWhenAStandbyTakesOver) {
   }
 }
 
+// Nine services say how they are, each four times a second: how their words lie to each other is no gap.
+TEST(TopicStatistics, CountsTheGapsOfEachWriter) {
+  TopicStatistics topic;
+  const auto word = [](int64_t at_ms, uint64_t i, uint64_t writer) {
+    auto made = sample(at_ms, i);
+    made.writer = writer;
+    return made;
+  };
+  for (uint64_t i = 0; i < 40; ++i) {
+    for (uint64_t writer = 1; writer <= 9; ++writer) {
+      topic.add(word(static_cast<int64_t>(250 * i + writer), i, writer));
+    }
+  }
+  EXPECT_EQ(topic.numbers(kBegin_ns + 10'000 * kMs).gaps, 0U);
+  EXPECT_NEAR(topic.usual_gap_s(), 0.25, 1e-3);
+  for (uint64_t writer = 2; writer <= 9; ++writer) topic.add(word(static_cast<int64_t>(10'000 + writer), 40, writer));
+  topic.add(word(12'000, 40, 1));
+  EXPECT_EQ(topic.numbers(kBegin_ns + 12'000 * kMs).gaps, 1U) << "the first one was silent for two seconds";
+}
+
+TEST(BeforeListening, IsOnlyWhatAStandingValueWas) {
+  constexpr int64_t kHour_ms = 3'600'000;
+  const int64_t since_ns = kBegin_ns;
+  BeforeListening standing(true, since_ns);
+  EXPECT_TRUE(standing.was_sent(sample(10, 1, 5'000)));
+  EXPECT_FALSE(standing.was_sent(sample(20, 2, 5)));
+  EXPECT_TRUE(standing.was_sent(sample(30, 3, kHour_ms))) << "of a clock that is behind it cannot be told ...";
+  EXPECT_FALSE(standing.was_sent(sample(2'100, 4, kHour_ms))) << "... but by now it has come";
+  BeforeListening flowing(false, since_ns);
+  EXPECT_FALSE(flowing.was_sent(sample(10, 1, kHour_ms))) << "a clock that is ahead silences no topic";
+}
+
 TEST(TopicStatistics, TellsLatencyByPercentileAndBucket) {
   TopicStatistics topic;
   for (int i = 0; i < 100; ++i) topic.add(sample(10 * i, static_cast<uint64_t>(i), i + 1));

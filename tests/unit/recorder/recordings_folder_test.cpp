@@ -4,12 +4,14 @@
 #include <sys/mount.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "core/random.hpp"
 #include "core/time.hpp"
 #include "mcap/reader.hpp"
 #include "recorder/housekeeper.hpp"
+#include "recorder/recorder_status.hpp"
 #include "recorder/recording.hpp"
 
 namespace railfix::recorder {
@@ -242,8 +244,10 @@ TEST_F(RecordingsFolder, SurveyCountsWhatIsThere) {
   EXPECT_EQ(seen.protected_files, 1U);
   EXPECT_EQ(seen.protected_bytes, 1000U);
   EXPECT_EQ(seen.event_bytes, 1000U);
-  EXPECT_GT(seen.disk_free_bytes, 0U);
+  EXPECT_GT(seen.disk_free_bytes.value_or(0), 0U);
   EXPECT_EQ(survey(folder_ / "nowhere").files, 0U);
+  EXPECT_FALSE(survey(folder_ / "nowhere").disk_free_bytes) << "cannot be told is not full";
+  EXPECT_TRUE(std::isnan(status_of({}, survey(folder_ / "nowhere"), 0).disk_free_mb()));
 }
 
 TEST_F(RecordingsFolder, RecordingsAreFoundByWhatPeopleCallThem) {

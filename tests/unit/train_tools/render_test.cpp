@@ -30,7 +30,9 @@ TEST_F(TrainFolder, EachHostGetsItsConfigurationComposeFileAndUnit) {
   EXPECT_THAT(config["common"]["peers"].as<std::vector<std::string>>(), ElementsAre("10.42.1.11"));
   EXPECT_EQ(config["fusion"]["map"].as<std::string>(), (out / "line.map").string());
   EXPECT_EQ(config["tpr_publisher"]["nid_engine"].as<int>(), 460042);
-  EXPECT_THAT(config["monitor"]["expected"].as<std::vector<std::string>>(), Contains("frame_grabber"));
+  EXPECT_THAT(config["monitor"]["expected"].as<std::vector<std::string>>(),
+              AllOf(Contains("frame_grabber@cab"), Contains("fusion@coach"), Contains("fusion@cab")))
+      << "the standby, too";
   EXPECT_TRUE(fs::exists(out / "line.map"));
   const auto compose = YAML::LoadFile((out / "compose.yaml").string());
   const auto fusion = compose["services"]["fusion"];

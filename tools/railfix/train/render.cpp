@@ -59,7 +59,10 @@ YAML::Node settings_on(const Manifest& manifest, const TrainHost& host, const st
   if (manifest.service("monitor") != nullptr) fill(settings["monitor"], "address", host.address);
   if (manifest.service("monitor") != nullptr && !settings["monitor"]["expected"]) {
     for (const auto& service : manifest.services) {
-      if (service.name != "monitor") settings["monitor"]["expected"].push_back(service.name);
+      if (service.name == "monitor") continue;
+      for (const auto& on : {service.host, service.standby}) {
+        if (!on.empty()) settings["monitor"]["expected"].push_back(service.name + "@" + on);
+      }
     }
   }
   return settings;

@@ -1,9 +1,10 @@
 // The socket to the monitor: asks for what is visible, comes back by itself, and notices when nobody answers any more.
 import { signal } from "@preact/signals";
-import { connection, show_picture, take } from "./store";
+import { Newest } from "./newest";
+import { connection, late_s, note_arrival, show_picture, take } from "./store";
 import { type Message, type Reply, split_picture } from "./wire";
 
-const SILENCE_MS = 4000; // a watched state says something at least once a second
+const SILENCE_MS = 4000; // something comes at least once a second, whatever is watched
 const REPLY_MS = 10000;
 const RETRY_MS = [250, 500, 1000, 2000];
 
@@ -17,6 +18,7 @@ export class Live {
   private next_id = 1;
   private watched: string[] = [];
   private decoding = false;
+  private readonly newest = new Newest(take, (callback) => requestAnimationFrame(callback));
   private readonly waiting = new Map<number, (reply: Reply) => void>();
 
   constructor(
@@ -80,13 +82,14 @@ export class Live {
 
   private text(data: string): void {
     const message = JSON.parse(data) as Message;
+    note_arrival(message, this.heard_ms);
     if (message.kind === "hello") {
       this.tries = 0;
       connection.value = { up: true, since_ms: Date.now(), ever: true };
       this.greeted();
     }
     if (message.kind === "reply") this.answered(message);
-    else take(message);
+    else this.newest.put(message, this.heard_ms);
   }
 
   /// One picture at a time: while one is being decoded, those that come are skipped.
@@ -94,24 +97,25 @@ export class Live {
     const picture = split_picture(data);
     if (picture === null || this.decoding) return;
     this.decoding = true;
+    const [at_ms, waited_s] = [this.heard_ms, late_s.value];
     try {
       const image = await createImageBitmap(new Blob([picture.jpeg as BlobPart], { type: "image/jpeg" }));
-      show_picture({ camera: picture.header.camera, stamp_ns: picture.header.stamp_ns, image });
+      show_picture({ camera: picture.header.camera, stamp_ns: picture.header.stamp_ns, image }, at_ms, waited_s);
     } catch {
-      // A picture that cannot be decoded is not shown; the age of the last one says so.
+      // A picture that cannot be decoded is not shown, and the last one grows old.
     } finally {
       this.decoding = false;
     }
   }
 
   private check(): void {
-    const silent = performance.now() - this.heard_ms > SILENCE_MS;
-    if (this.socket !== null && silent && this.watched.includes("state")) this.lost();
+    if (this.socket !== null && performance.now() - this.heard_ms > SILENCE_MS) this.lost();
   }
 
   private lost(): void {
     const socket = this.socket;
     this.socket = null;
+    this.newest.drop();
     socket?.close();
     if (connection.value.up) connection.value = { up: false, since_ms: Date.now(), ever: true };
     for (const id of [...this.waiting.keys()]) this.answered({ id, done: false, text: "The connection to the train was lost." });

@@ -22,7 +22,6 @@ import type { About, MapData } from "./wire";
 
 const RADIUS_M = 20000; // of the part of a long map around the train
 const LONG_MAP_M = 300000;
-const CAMERAS_MS = 2000;
 
 async function fetched<T>(path: string): Promise<T | null> {
   try {
@@ -109,10 +108,6 @@ setInterval(() => {
   remember_moment(Date.now());
   if (left_the_map()) void fetch_map();
 }, 1000);
-// A monitor that was just started does not know the cameras yet.
-setInterval(() => {
-  if (page_visible.value && connection.value.up && about.value?.cameras.length === 0) void fetch_about();
-}, CAMERAS_MS);
 
 /// Over what index.html shows until here.
 function show(): void {

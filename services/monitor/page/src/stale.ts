@@ -3,17 +3,21 @@
 export interface Held<T> {
   value: T | null;
   at_ms: number; // when it came, by performance.now()
+  late_s?: number; // how long it had waited on the way
 }
 
 export const nothing = <T>(): Held<T> => ({ value: null, at_ms: 0 });
 
 /// Seconds after which a value of this kind is no longer live; the server's own rate leaves two or three in that time.
-export const FRESH_S = { state: 1.5, curvature: 1.5, view: 1.5, services: 2, topics: 3.5, recorder: 3.5, player: 1.5 } as const;
+export const FRESH_S = { state: 1.5, curvature: 1.5, picture: 1.5, services: 2, topics: 3.5, recorder: 3.5, player: 1.5 } as const;
 
-/// Seconds since the train made the value: what the server said plus what passed here. Infinite when there is none.
+/// What waits longer on the way than that is not shown as live, and the link or this browser is named.
+export const LATE_S = 1.5;
+
+/// Seconds since the train made the value: what the server said plus what passed on the way and here. Infinite when there is none.
 export function age_s<T>(held: Held<T>, passed_ms: number, age_at_arrival_s = 0): number {
   if (held.value === null) return Infinity;
-  return Math.max(0, (passed_ms - held.at_ms) / 1000) + Math.max(0, age_at_arrival_s);
+  return Math.max(0, (passed_ms - held.at_ms) / 1000) + Math.max(0, age_at_arrival_s) + (held.late_s ?? 0);
 }
 
 /// How much later than the quickest message of a connection another one came: so long it has waited on the way. The two

@@ -9,12 +9,19 @@ export interface Box {
   north: number;
 }
 type Edge = MapData["edges"][number];
+type Landmark = MapData["landmarks"][number];
+type End = { edge: Edge; start: boolean };
+/// An edge that is entered at one of its ends, and how far from there.
+type Leg = End & { left_m: number };
 
 const JOINED_M = 0.5; // ends nearer than that are one point
+const MOST_LEGS = 1000; // of a ring
 const SAME_WAY = 0.9; // cosine between the tangents of a train's way through a joint
 
 export class TrackMap {
   private readonly by_id = new Map<number, Edge>();
+  private readonly landmarks_by_edge = new Map<number, Landmark[]>();
+  private readonly joints = new Map<string, End[]>();
   readonly boxes = new Map<number, Box>();
 
   constructor(readonly data: MapData) {
@@ -22,6 +29,11 @@ export class TrackMap {
       if (edge.line.length === 0) continue;
       this.by_id.set(edge.id, edge);
       this.boxes.set(edge.id, box_of(edge.line));
+    }
+    for (const one of data.landmarks) {
+      const there = this.landmarks_by_edge.get(one.edge);
+      if (there === undefined) this.landmarks_by_edge.set(one.edge, [one]);
+      else there.push(one);
     }
   }
 
@@ -48,10 +60,57 @@ export class TrackMap {
     if (edge === undefined) return [];
     const from = place.offset_m - behind_m;
     const to = place.offset_m + ahead_m;
-    const pieces = [this.piece(edge, from, to)];
-    if (from < 0) this.go_on(edge, true, -from, pieces, 0);
-    if (to > edge.length_m) this.go_on(edge, false, to - edge.length_m, pieces, 0);
-    return pieces.filter((piece) => piece.length > 1);
+    const beyond = [...this.beyond(edge, true, -from), ...this.beyond(edge, false, to - edge.length_m)];
+    return [this.piece(edge, from, to), ...beyond.map((leg) => this.part_of(leg))].filter((piece) => piece.length > 1);
+  }
+
+  /// The landmarks within `reach_m` of the place, with the metres to them along the edge; over joints as long as there is one way only.
+  near(place: Place, reach_m: number): { one: Landmark; along_m: number }[] {
+    const edge = this.by_id.get(place.edge);
+    if (edge === undefined) return [];
+    const found = this.landmarks_on(edge.id).map((one) => ({ one, along_m: one.offset_m - place.offset_m }));
+    for (const start of [true, false]) {
+      const to_end_m = start ? place.offset_m : edge.length_m - place.offset_m;
+      for (const leg of this.only_way(edge, start, reach_m - to_end_m)) {
+        for (const one of this.landmarks_on(leg.edge.id)) {
+          const into_m = leg.start ? one.offset_m : leg.edge.length_m - one.offset_m;
+          found.push({ one, along_m: (start ? -1 : 1) * (reach_m - leg.left_m + into_m) });
+        }
+      }
+    }
+    return found.filter(({ along_m }) => Math.abs(along_m) < reach_m).sort((a, b) => a.along_m - b.along_m);
+  }
+
+  private landmarks_on = (edge: number) => this.landmarks_by_edge.get(edge) ?? [];
+
+  /// What `left_m` beyond an end of the edge reach, each edge once, by its shortest way.
+  private beyond(edge: Edge, start: boolean, left_m: number): Leg[] {
+    const found = new Map<string, Leg>();
+    const open = left_m > 0 ? this.following(edge, start, left_m) : [];
+    while (open.length > 0) {
+      open.sort((a, b) => a.left_m - b.left_m);
+      const leg = open.pop() as Leg;
+      const key = `${leg.edge.id} ${leg.start}`;
+      if (found.has(key)) continue;
+      found.set(key, leg);
+      if (leg.left_m > leg.edge.length_m) open.push(...this.following(leg.edge, !leg.start, leg.left_m - leg.edge.length_m));
+    }
+    return [...found.values()];
+  }
+
+  private only_way(edge: Edge, start: boolean, left_m: number): Leg[] {
+    const legs: Leg[] = [];
+    for (let ways = left_m > 0 ? this.following(edge, start, left_m) : []; ways.length === 1; ) {
+      const leg = ways[0] as Leg;
+      legs.push(leg);
+      const rest_m = leg.left_m - leg.edge.length_m;
+      ways = rest_m > 0 && legs.length < MOST_LEGS ? this.following(leg.edge, !leg.start, rest_m) : [];
+    }
+    return legs;
+  }
+
+  private part_of({ edge, start, left_m }: Leg): Point[] {
+    return start ? this.piece(edge, 0, left_m) : this.piece(edge, edge.length_m - left_m, edge.length_m);
   }
 
   private piece(edge: Edge, from: number, to: number): Point[] {
@@ -63,22 +122,24 @@ export class TrackMap {
     return [ends[0], ...inner, ends[1]];
   }
 
-  private go_on(edge: Edge, start: boolean, left_m: number, pieces: Point[][], depth: number): void {
-    if (depth > 4) return;
+  /// The ways of a train over an end of the edge.
+  private following(edge: Edge, start: boolean, left_m: number): Leg[] {
     const out = tangent(edge, start);
-    for (const next of this.joined(edge, start)) {
+    const goes_on = (next: End) => {
       const inward = tangent(next.edge, next.start);
-      if (-(out[0] * inward[0] + out[1] * inward[1]) < SAME_WAY) continue;
-      const length = next.edge.length_m;
-      pieces.push(next.start ? this.piece(next.edge, 0, left_m) : this.piece(next.edge, length - left_m, length));
-      if (left_m > length) this.go_on(next.edge, !next.start, left_m - length, pieces, depth + 1);
-    }
+      return -(out[0] * inward[0] + out[1] * inward[1]) >= SAME_WAY;
+    };
+    return this.joined(edge, start).filter(goes_on).map((next) => ({ ...next, left_m }));
   }
 
   /// The edges that have an end where this one has its own.
-  private joined(edge: Edge, start: boolean): { edge: Edge; start: boolean }[] {
+  private joined(edge: Edge, start: boolean): End[] {
+    const key = `${edge.id} ${start}`;
+    const known = this.joints.get(key);
+    if (known !== undefined) return known;
     const [easting, northing] = end_point(edge, start);
-    const found: { edge: Edge; start: boolean }[] = [];
+    const found: End[] = [];
+    this.joints.set(key, found);
     for (const other of this.by_id.values()) {
       for (const other_start of [true, false]) {
         const [e, n] = end_point(other, other_start);

@@ -148,7 +148,7 @@ export interface RecorderStatus {
   ring_s: number;
   kept_mb: number;
   quota_mb: number;
-  disk_free_mb: number;
+  disk_free_mb: number | null;
   files: number;
   protected_files: number;
   state: "stopped" | "recording" | "paused" | "waiting";
@@ -186,6 +186,7 @@ export interface Reply {
 
 export type Message =
   | { kind: "hello"; train: string; version: string; host: string; now_ns: number }
+  | { kind: "beat"; sent_ns: number; now_ns: number; cameras: string[] } // once a second, whatever is watched
   | ({ kind: "state" } & Partial<TrainState>)
   | ({ kind: "curvature" } & Curvature)
   | ({ kind: "view" } & View)
@@ -195,7 +196,7 @@ export type Message =
   | { kind: "log"; records: LogRecord[] }
   | ({ kind: "recorder" } & RecorderStatus)
   | ({ kind: "player" } & PlayerStatus)
-  | { kind: "problems"; problems: Problem[] }
+  | { kind: "problems"; now_ns?: number; problems: Problem[] } // now_ns: not from a monitor before this one
   | ({ kind: "reply" } & Reply);
 
 // GET /api/map

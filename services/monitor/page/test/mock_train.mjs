@@ -109,6 +109,7 @@ export function start_train({ port = 0, scenario = "well", page = join(here, "..
     };
     const timer = setInterval(() => {
       ++ticks;
+      if (ticks % 10 === 0) say({ kind: "beat", sent_ns: performance.now() * 1e6, now_ns: now_ns(), cameras: ["cam0"] });
       for (const one of watch) if (speak[one] && ticks % speak[one][0] === 0) speak[one][1]();
     }, 100);
     socket.on("close", () => clearInterval(timer));
@@ -117,7 +118,7 @@ export function start_train({ port = 0, scenario = "well", page = join(here, "..
       if (message.watch) {
         const fresh = message.watch.filter((one) => !watch.has(one));
         watch = new Set(message.watch);
-        if (fresh.includes("problems")) say({ kind: "problems", problems: problems_of(scenario, began) });
+        if (fresh.includes("problems")) say({ kind: "problems", now_ns: now_ns(), problems: problems_of(scenario, began) });
         if (fresh.includes("reports")) for (let i = 0; i < 20; ++i) say(report(i + 1, 120 - i * 6));
         if (fresh.includes("log")) say({ kind: "log", records: Array.from({ length: 40 }, (_, i) => line(i - 40)) });
         for (const one of fresh) if (["services", "topics", "recorder"].includes(one)) speak[one][1]();

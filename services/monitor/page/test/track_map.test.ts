@@ -45,4 +45,34 @@ describe("stretches", () => {
   it("end where the track ends", () => expect(map.stretch({ edge: 1, offset_m: 5 }, 50, 0).map(length)).toEqual([expect.closeTo(5)]));
 });
 
+describe("many short edges", () => {
+  const EDGE_M = 60;
+  const edges = Array.from({ length: 20 }, (_, i) => ({ id: i + 1, length_m: EDGE_M, line: straight([i * EDGE_M, 0], [(i + 1) * EDGE_M, 0], EDGE_M) }));
+  const balise = (id: number, edge: number, offset_m: number) => ({ id, edge, offset_m, kind: "balise", name: `B${id}`, easting_m: 0, northing_m: 0, across_m: 0 });
+  const data = { edges, switches: [], landmarks: [balise(1, 10, 30), balise(2, 12, 10), balise(3, 8, 50)] };
+  const chain = new TrackMap(data);
+  const place = { edge: 10, offset_m: 55 };
+
+  it("do not shorten the interval", () => {
+    const whole = chain.stretch(place, 400, 400).map(length).reduce((sum, one) => sum + one, 0);
+    expect(whole).toBeCloseTo(800);
+  });
+  it("are each drawn once, as far as the shortest way reaches, where two ways meet again", () => {
+    const loop = { id: 99, length_m: 90, line: straight([10 * EDGE_M, 0], [11 * EDGE_M, 0], 90) };
+    const doubled = new TrackMap({ ...data, edges: [...edges, loop] });
+    const [once, twice] = [chain, doubled].map((one) => one.stretch(place, 0, 400).map(length));
+    expect(twice?.length).toBe((once?.length ?? 0) + 1);
+    expect(twice?.reduce((sum, one) => sum + one, 0)).toBeCloseTo(400 + EDGE_M);
+  });
+  it("have the landmarks behind their joints", () => {
+    expect(chain.near(place, 100).map(({ one, along_m }) => [one.name, Math.round(along_m)])).toEqual([["B1", -25], ["B2", 75]]);
+    expect(chain.near(place, 140).map(({ one }) => one.name)).toEqual(["B3", "B1", "B2"]);
+  });
+  it("have none behind a switch, where the way is not known", () => {
+    const leg = { id: 98, length_m: EDGE_M, line: straight([10 * EDGE_M, 0], [11 * EDGE_M, 5], EDGE_M) };
+    const branched = new TrackMap({ ...data, edges: [...edges, leg] });
+    expect(branched.near(place, 140).map(({ one }) => one.name)).toEqual(["B3", "B1"]);
+  });
+});
+
 it("finds its box", () => expect(map.box()).toEqual({ west: 0, south: 0, east: 150, north: 30 }));

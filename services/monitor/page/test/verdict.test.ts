@@ -1,5 +1,5 @@
 import { beforeEach, describe, expect, it, vi } from "vitest";
-import { age_of, connection, fresh, passed_ms, problems, state, take, tick } from "../src/store";
+import { age_of, connection, fresh, note_arrival, passed_ms, problems, state, take, tick } from "../src/store";
 import { nothing } from "../src/stale";
 import { verdict } from "../src/verdict";
 import type { Message } from "../src/wire";
@@ -7,7 +7,11 @@ import type { Message } from "../src/wire";
 const said = () => verdict(problems.value !== null, fresh("state"), age_of("state"));
 const hello = () => take({ kind: "hello", now_ns: Date.now() * 1e6 } as Message);
 const well = () => take({ kind: "problems", problems: [] } as Message);
-const position = (more: object) => take({ kind: "state", ...more } as Message);
+const position = (more: object) => {
+  const message = { kind: "state", ...more } as Message;
+  note_arrival(message, performance.now());
+  take(message);
+};
 const later = (seconds: number) => (passed_ms.value = performance.now() + seconds * 1000);
 
 describe("all is well", () => {

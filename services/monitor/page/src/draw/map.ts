@@ -102,9 +102,14 @@ class Scene {
       if (point !== null) this.possible(point, `${this.map.name(other.edge)}: ${probability(other.probability)}`);
     }
     if (!state.track_known || !this.map.has(state.edge)) return;
+    const point = this.map.at(state) as Point;
+    const { over_m, under_m } = state;
+    if (over_m === null || under_m === null) {
+      this.possible(point, "no bound is known");
+      return;
+    }
     const { context } = this.paper;
     const reverse = state.direction === "reverse";
-    const [over_m, under_m] = [state.over_m ?? 0, state.under_m ?? 0];
     const [before_m, after_m] = reverse ? [under_m, over_m] : [over_m, under_m];
     context.strokeStyle = live ? this.c.band : this.c.faint;
     context.lineWidth = 11;
@@ -112,7 +117,7 @@ class Scene {
       polyline(context, piece.map(this.project));
       context.stroke();
     }
-    const [x, y] = this.project(this.map.at(state) as Point);
+    const [x, y] = this.project(point);
     this.arrow(x, y, state.direction === "unknown" ? null : state.heading_rad, live ? this.c.train : this.c.muted);
     this.taken.push({ west: x - 12, east: x + 12, south: y - 12, north: y + 12 });
     if (!live && this.room("old", x + 12, y + 16)) label(context, "old", x + 12, y + 16, this.c.muted);
@@ -212,6 +217,7 @@ class Scene {
 
 const NAMED_FROM_PX = 24; // so much of an edge must be seen
 const NUMBERED_FROM_PX = 80;
+const NEXT_WITHIN_M = 20000; // a landmark farther ahead is not named as the next
 
 /// The middle of what lies of a line on the paper; null when that is shorter than `least_px`.
 function middle_inside(line: [number, number][], paper: { width: number; height: number }, least_px: number): [number, number] | null {
@@ -271,9 +277,11 @@ export function map_in_words(map: TrackMap, state: TrainState | null): string {
   const others = state.alternatives.map((one) => `${map.name(one.edge)} at ${metres(one.offset_m)}, ${probability(one.probability)}`);
   const also = others.length === 0 ? "" : ` Also possible: ${others.join("; ")}.`;
   if (!state.track_known) return `Line map. The track is not yet known.${also}`;
-  const next = map.data.landmarks
-    .filter((one) => one.edge === state.edge && (state.direction === "reverse" ? one.offset_m < state.offset_m : one.offset_m > state.offset_m))
-    .sort((a, b) => Math.abs(a.offset_m - state.offset_m) - Math.abs(b.offset_m - state.offset_m))[0];
-  const ahead = next === undefined ? "" : ` Next: ${next.name || words(next.kind)} in ${metres(Math.abs(next.offset_m - state.offset_m))}.`;
+  const sign = state.direction === "reverse" ? -1 : 1;
+  const next = map
+    .near(state, NEXT_WITHIN_M)
+    .filter(({ along_m }) => sign * along_m > 0)
+    .sort((a, b) => Math.abs(a.along_m) - Math.abs(b.along_m))[0];
+  const ahead = next === undefined ? "" : ` Next: ${next.one.name || words(next.one.kind)} in ${metres(Math.abs(next.along_m))}.`;
   return `Line map. Train on ${map.name(state.edge)} at ${metres(state.offset_m)}.${ahead}${also}`;
 }

@@ -14,15 +14,21 @@ export function draw_strip(canvas: HTMLCanvasElement, map: TrackMap, state: Trai
   if (paper === null) return;
   const { context, width, height } = paper;
   const c = colours();
-  const [over_m, under_m] = [state.over_m ?? 0, state.under_m ?? 0];
-  const reach = reach_m(over_m, under_m);
+  const [over_m, under_m] = [state.over_m, state.under_m];
+  const bounded = over_m !== null && under_m !== null;
+  const reach = reach_m(over_m ?? 0, under_m ?? 0);
   const sign = state.direction === "reverse" ? -1 : 1;
   const x_of = (ahead_m: number) => width / 2 + (ahead_m / reach) * (width / 2);
   const y = height - 24;
 
-  context.fillStyle = live ? c.band : c.faint;
-  const left = x_of(-over_m);
-  context.fillRect(left, y - 9, Math.max(2, x_of(under_m) - left), 18);
+  const band = live ? c.band : c.faint;
+  if (bounded) {
+    context.fillStyle = band;
+    const left = x_of(-over_m);
+    context.fillRect(left, y - 9, Math.max(2, x_of(under_m) - left), 18);
+  } else {
+    hatch(context, 0, y - 9, width, 18, band);
+  }
   context.strokeStyle = c.track;
   context.lineWidth = 2;
   polyline(context, [[0, y], [width, y]]);
@@ -41,9 +47,9 @@ export function draw_strip(canvas: HTMLCanvasElement, map: TrackMap, state: Trai
   }
 
   let last = -Infinity;
-  const near = map.data.landmarks
-    .filter((one) => one.edge === state.edge && Math.abs(one.offset_m - state.offset_m) < reach)
-    .map((one) => ({ one, ahead: sign * (one.offset_m - state.offset_m) }))
+  const near = map
+    .near(state, reach)
+    .map(({ one, along_m }) => ({ one, ahead: sign * along_m }))
     .sort((a, b) => a.ahead - b.ahead);
   for (const { one, ahead } of near) {
     const x = x_of(ahead);
@@ -56,6 +62,7 @@ export function draw_strip(canvas: HTMLCanvasElement, map: TrackMap, state: Trai
     last = x + span / 2;
   }
 
+  if (!bounded) return; // no arrow says where the train is
   const x = x_of(0);
   context.fillStyle = live ? c.train : c.muted;
   context.beginPath();
@@ -65,6 +72,16 @@ export function draw_strip(canvas: HTMLCanvasElement, map: TrackMap, state: Trai
   context.fill();
 }
 
+function hatch(context: CanvasRenderingContext2D, left: number, top: number, width: number, height: number, colour: string): void {
+  context.strokeStyle = colour;
+  context.lineWidth = 3;
+  for (let x = left - height; x < left + width; x += 9) {
+    polyline(context, [[x, top + height], [x + height, top]]);
+    context.stroke();
+  }
+}
+
 export function strip_in_words(state: TrainState): string {
+  if (state.over_m === null || state.under_m === null) return "How far from where it is drawn the train may be has no bound.";
   return `The train is at most ${bounds_in_words(state.over_m, state.under_m)} of where it is drawn.`;
 }

@@ -1,13 +1,13 @@
 // Whose train this is, and whether what is shown is live.
 import { clock, duration } from "../format";
-import { about, connection, now_ms } from "../store";
+import { about, connection, is_late, late_s, now_ms } from "../store";
 import { choice, type Choice } from "../theme";
 
 function Connection() {
   const { up, since_ms, ever } = connection.value;
   const since = `${clock(since_ms, now_ms.value)} (${duration((now_ms.value - since_ms) / 1000)})`;
-  const text = up ? "Connected" : ever ? `No connection to the train since ${since}` : "Connecting …";
-  return <p class={`connection ${up ? "ok" : ever ? "bad" : "warn"}`} title={up ? `connected since ${since}` : undefined}>{text}</p>;
+  const text = up ? (is_late.value ? `Connected, ${duration(late_s.value)} late` : "Connected") : ever ? `No connection to the train since ${since}` : "Connecting …";
+  return <p class={`connection ${up ? (is_late.value ? "warn" : "ok") : ever ? "bad" : "warn"}`} title={up ? `connected since ${since}` : undefined}>{text}</p>;
 }
 
 export function Header() {

@@ -4,14 +4,14 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import { duration } from "../format";
 import { kept } from "../keep";
-import { age_of, fresh } from "../store";
+import { age_of, connection, fresh, is_late } from "../store";
 import { observe, show } from "../visible";
 
 interface Props {
   id: string;
   title: string;
   topics: readonly string[];
-  kind?: Parameters<typeof age_of>[0] | undefined; // whose age is shown and greys the content
+  kind?: Parameters<typeof age_of>[0] | undefined; // whose age is shown and greys the content; without one the connection does
   aside?: ComponentChildren;
   children: ComponentChildren;
 }
@@ -26,7 +26,8 @@ export function Panel({ id, title, topics, kind, aside, children }: Props) {
   useEffect(() => show(id, open.value === "open" && near.value ? list.split(",") : null), [list]);
   useEffect(() => () => show(id, null), []);
   const is_open = open.value === "open";
-  const old = kind !== undefined && is_open && fresh(kind) === "stale";
+  const unheard = (!connection.value.up && connection.value.ever) || is_late.value;
+  const old = is_open && (kind === undefined ? unheard : fresh(kind) === "stale");
   return (
     <section class={`panel ${old ? "stale" : ""}`} id={id} ref={frame} aria-labelledby={`${id}-title`}>
       <header>

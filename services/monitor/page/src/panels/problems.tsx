@@ -1,17 +1,30 @@
 // What is wrong, first thing on the page; a lost connection before all else.
-import { useSignal, useSignalEffect } from "@preact/signals";
+import { computed, useSignal, useSignalEffect } from "@preact/signals";
 import { useRef } from "preact/hooks";
 import { clock, duration } from "../format";
-import { age_of, connection, fresh, host_ms, now_ms, problems } from "../store";
+import { age_of, connection, fresh, is_late, late_s, now_ms, problems } from "../store";
 import { verdict } from "../verdict";
 import type { Problem } from "../wire";
 
 export const LOST = "connection";
+const LATE = "late";
+const late_since_ms = computed(() => (is_late.value ? Date.now() : 0));
 
-/// The monitor's problems, and our own when there is no connection: then the monitor's are old news.
+function late(): Problem {
+  return {
+    id: LATE,
+    level: "error",
+    what: `What is shown is ${duration(late_s.value)} old: the link to the train or this browser is slow`,
+    what_to_do: "The train itself may be well. Close other pages and panels, or use a faster link or computer.",
+    since_ns: late_since_ms.value * 1e6,
+  };
+}
+
+/// The monitor's problems, and our own when there is no connection or a slow one: then the monitor's are old news.
 export function all_problems(): Problem[] {
   const known = problems.value ?? [];
   const { up, since_ms, ever } = connection.value;
+  if (up && is_late.value) return [late(), ...known];
   if (up || (!ever && now_ms.value - since_ms < 1500)) return known;
   const lost: Problem = {
     id: LOST,
@@ -23,10 +36,8 @@ export function all_problems(): Problem[] {
   return [lost, ...known];
 }
 
-const own_time = (problem: Problem) => (problem.id === LOST ? problem.since_ns / 1e6 : host_ms(problem.since_ns));
-
 function One({ problem, old }: { problem: Problem; old: boolean }) {
-  const since_ms = own_time(problem);
+  const since_ms = problem.since_ns / 1e6;
   return (
     <li class={`problem ${problem.level} ${old ? "stale" : ""}`}>
       <span class="badge">{problem.level === "error" ? "Error" : "Warning"}</span>
@@ -46,7 +57,8 @@ function NoProblem() {
 
 export function Problems() {
   const list = all_problems();
-  const up = connection.value.up;
+  const old = !connection.value.up || is_late.value;
+  const own = (problem: Problem) => problem.id === LOST || problem.id === LATE;
   return (
     <section id="problems" aria-labelledby="problems-title">
       <h2 id="problems-title" class="unseen">
@@ -55,7 +67,7 @@ export function Problems() {
       {list.length > 0 ? (
         <ul>
           {list.map((problem) => (
-            <One key={problem.id} problem={problem} old={!up && problem.id !== LOST} />
+            <One key={problem.id} problem={problem} old={old && !own(problem)} />
           ))}
         </ul>
       ) : (

@@ -47,7 +47,7 @@ function Buttons({ one }: { one: RecorderStatus }) {
 }
 
 function Disk({ one }: { one: RecorderStatus }) {
-  const limit = one.quota_mb > 0 ? one.quota_mb : one.kept_mb + one.disk_free_mb;
+  const limit = one.quota_mb > 0 ? one.quota_mb : one.kept_mb + (one.disk_free_mb ?? 0);
   const share = limit > 0 ? Math.min(1, one.kept_mb / limit) : 0;
   const text = one.quota_mb > 0 ? `${bytes(one.kept_mb * 1e6)} of ${bytes(one.quota_mb * 1e6)} allowed` : `${bytes(one.kept_mb * 1e6)}, no limit`;
   return (
@@ -58,7 +58,7 @@ function Disk({ one }: { one: RecorderStatus }) {
         <meter min={0} max={1} value={share} high={0.9} aria-label="Share of the room used by recordings" />
       </dd>
       <dt>Disk free</dt>
-      <dd>{bytes(one.disk_free_mb * 1e6)}</dd>
+      <dd>{bytes(one.disk_free_mb === null ? null : one.disk_free_mb * 1e6)}</dd>
     </>
   );
 }

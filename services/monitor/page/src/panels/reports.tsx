@@ -1,8 +1,8 @@
 // Position reports as they leave, newest first, with the message unfolded.
 import { signal } from "@preact/signals";
 import { unfold } from "../etcs";
-import { capital, day, metres, number, time_of_day, words } from "../format";
-import { host_ms, now_ms, reports } from "../store";
+import { capital, day, duration, metres, number, time_of_day, words } from "../format";
+import { host_ms, host_now_ms, now_ms, reports } from "../store";
 import type { Report } from "../wire";
 import { Nothing, Panel } from "./panel";
 
@@ -72,9 +72,10 @@ export function Reports() {
   const last = list[0];
   // Recorded data keeps its own date.
   const other_day = last === undefined || day(host_ms(last.sent_ns)) === day(now_ms.value) ? "" : day(host_ms(last.sent_ns));
+  const ago = last === undefined || other_day !== "" ? "" : `, sent ${duration(Math.max(0, (host_now_ms.value - last.sent_ns / 1e6) / 1000))} ago`;
   return (
     <Panel id="reports" title="Position reports" topics={["reports"]}
-      aside={last === undefined ? undefined : <span class="muted">newest of the last {list.length} first; press a time for the message</span>}>
+      aside={last === undefined ? undefined : <span class="muted">newest of the last {list.length} first{ago}; press a time for the message</span>}>
       {last === undefined ? (
         <Nothing>None has left since the monitor listens.</Nothing>
       ) : (
