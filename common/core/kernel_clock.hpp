@@ -16,4 +16,11 @@ inline std::optional<int64_t> clock_error_ns() {
   return int64_t{clock.maxerror} * 1000;
 }
 
+/// Well enough for stamps of two clocks to be compared. Without its keeper the kernel's bound grows by half a
+/// millisecond a second, so an end is told after three minutes.
+inline bool is_kept(std::optional<int64_t> max_error_ns) {
+  constexpr int64_t kMostNs = 100'000'000;  // 3 m at 30 m/s
+  return max_error_ns && *max_error_ns <= kMostNs;
+}
+
 }  // namespace railfix::core

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -167,7 +168,9 @@ core::Status Writer::write(const Message& message) {
   chunk_messages_[message.channel_id].push_back({message.log_time_ns, chunk_.size()});
   append(chunk_, message);
   statistics_.count(message.channel_id, message.log_time_ns);
-  return tick();
+  // It is taken: a chunk that the disk refuses is tried again with the next message, in tick() and in close().
+  (void)flush_old_chunk();
+  return sync_when_due();
 }
 
 core::Status Writer::write_metadata(const Metadata& metadata) {
@@ -182,14 +185,20 @@ core::Status Writer::write_metadata(const Metadata& metadata) {
 }
 
 core::Status Writer::tick() {
-  const int64_t now_ns = core::monotonic_ns();
-  const bool old = options_.chunk_age_s > 0 && now_ns - chunk_begun_ns_ >= core::to_ns(options_.chunk_age_s);
-  if (!chunk_.empty() && (old || chunk_.size() >= options_.chunk_bytes)) {
-    auto status = flush_chunk();
-    if (!status.ok()) return status;
-  }
-  if (options_.sync_period_s > 0 && now_ns - synced_ns_ >= core::to_ns(options_.sync_period_s)) return sync_beside();
-  return {};
+  auto status = flush_old_chunk();
+  return status.ok() ? sync_when_due() : status;
+}
+
+core::Status Writer::flush_old_chunk() {
+  const int64_t age_ns = core::monotonic_ns() - chunk_begun_ns_;
+  const bool old = options_.chunk_age_s > 0 && age_ns >= core::to_ns(options_.chunk_age_s);
+  return old || chunk_.size() >= options_.chunk_bytes ? flush_chunk() : core::Status();
+}
+
+core::Status Writer::sync_when_due() {
+  const bool due =
+      options_.sync_period_s > 0 && core::monotonic_ns() - synced_ns_ >= core::to_ns(options_.sync_period_s);
+  return due ? sync_beside() : core::Status();
 }
 
 core::Status Writer::flush_chunk() {
@@ -240,6 +249,11 @@ core::Status Writer::sync_beside() {
   synced_ns_ = core::monotonic_ns();
   syncing_ = std::async(std::launch::async, [this] { return sync(); });
   return status;
+}
+
+bool Writer::is_removed() const {
+  struct stat ours {};
+  return descriptor_ >= 0 && ::fstat(descriptor_, &ours) == 0 && ours.st_nlink == 0;
 }
 
 core::Status Writer::wait_for_sync() {

@@ -50,8 +50,8 @@ class Writer {
   core::Result<uint16_t> add_schema(const std::string& name, const std::string& encoding, const std::string& data);
   core::Result<uint16_t> add_channel(uint16_t schema_id, const std::string& topic, const std::string& message_encoding,
                                      const std::map<std::string, std::string>& metadata);
-  /// Copies the data. Error (here and below): the disk is full or gone. The file then ends behind its last whole
-  /// record, and a later call may succeed.
+  /// Copies the data. Error: the message was not taken. (Here and below) the disk is full or gone: the file then ends
+  /// behind its last whole record, and a later call may succeed.
   core::Status write(const Message& message);
   core::Status write_metadata(const Metadata& metadata);
   /// Closes a chunk that is too old and syncs when due; write() does the same. For callers whose messages may stop.
@@ -60,6 +60,10 @@ class Writer {
   core::Status close();
   /// Closes the file, unless close() has given it its name, and removes it.
   void discard();
+
+  /// Somebody has removed the file that is being written: what goes into it is gone when it is closed. One that was
+  /// moved is not.
+  [[nodiscard]] bool is_removed() const;
 
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
@@ -75,6 +79,8 @@ class Writer {
   Writer(std::filesystem::path file, WriterOptions options) : file_(std::move(file)), options_(std::move(options)) {}
   core::Status put(ByteView bytes);
   core::Status flush_chunk();
+  core::Status flush_old_chunk();
+  core::Status sync_when_due();
   core::Status sync();
   core::Status sync_beside();
   core::Status wait_for_sync();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/kernel_clock.hpp"
 #include "core/time.hpp"
 
 namespace railfix::service {
@@ -31,9 +32,8 @@ void ClockWatch::hear(const std::string& host, int64_t stamp_ns, int64_t receive
   if (const auto quickest = quickest_ns(late_ns); quickest && std::abs(*quickest) <= kToleratedNs) set_by_ns_ = 0;
 }
 
-// Without its keeper the kernel's bound grows by half a millisecond a second, so an end is told after three minutes.
 void ClockWatch::kept(std::optional<int64_t> max_error_ns) {
-  is_kept_ = max_error_ns && *max_error_ns <= kToleratedNs;
+  is_kept_ = core::is_kept(max_error_ns);
   was_kept_ = was_kept_ || is_kept_;
 }
 

@@ -22,6 +22,7 @@ void FrameGrabberService::prepare_live() {
   events.picture = [this](RawPicture picture) {
     context_.post([this, picture = std::move(picture)] { shoot(picture); });
   };
+  events.lost = [this](uint64_t pictures) { context_.post([this, pictures] { context_.health().dropped(pictures); }); };
   context_.health().ready();
   feed_ = std::make_unique<LiveFeed>(std::move(live_camera_), config_.live_config(), std::move(events));
 }
@@ -31,14 +32,19 @@ void FrameGrabberService::shoot(const RawPicture& picture) {
   context_.health().input();
   if (picture.lost > 0) context_.health().dropped(picture.lost);
   say_packets(picture.bad_packets);
+  no_host_time_ = picture.no_host_time;
   const auto text = [](const cv::Size& size) { return std::to_string(size.width) + "x" + std::to_string(size.height); };
   if (static_cast<size_t>(picture.size.area()) > msg::CAMERA_MAX_PIXELS) {
     context_.health().degraded("the camera sends " + text(picture.size) +
                                " pixels, more than camera_frame carries; set live.width_px and live.height_px");
     context_.health().dropped(1);
   } else if (!size_.empty() && picture.size != size_) {
-    context_.health().degraded("the camera sends " + text(picture.size) + " pixels, but its calibration is for " +
-                               text(size_) + "; give its own calibration, or set live.width_px and live.height_px");
+    context_.health().degraded("the camera sends " + text(picture.size) + " pixels, " +
+                               (config_.calibration.empty()
+                                    ? "where its first picture had " + text(size_) +
+                                          "; start frame_grabber anew, or set live.width_px and live.height_px"
+                                    : "but its calibration is for " + text(size_) +
+                                          "; give its own calibration, or set live.width_px and live.height_px"));
     context_.health().dropped(1);
   } else {
     if (size_.empty()) {

@@ -22,6 +22,10 @@ static_assert(kDark == msg::PICTURE_DARK && kSaturated == msg::PICTURE_SATURATED
 constexpr int kBadBeforeDegraded = 10;
 constexpr int kPicturesTried = 100;
 constexpr double kGuessedHeightM = 2.5;
+constexpr const char* kNoHostTime =
+    "the camera's clock does not follow PTP (live.ptp), so pictures are stamped when they come; see that the camera "
+    "has "
+    "PTP and that a ptp4l of this host's time (UTC, not TAI) is the master on its network";
 constexpr std::chrono::milliseconds kWaitCheck{100};
 
 /// "pictures are covered: look for ..."
@@ -176,7 +180,7 @@ void FrameGrabberService::play(const dataset::Picture& picture) {
   }
   context_.health().input();
   newest_ns_ = std::max(newest_ns_, picture.stamp_ns);
-  if (!lossless() && grabbed_ns - clock_sent_ns_ >= service::DataTime::kPeriodNs)
+  if (!lossless() && core::monotonic_ns() - clock_sent_ns_ >= service::DataTime::kPeriodNs)
     publish_clock(newest_ns_, grabbed_ns, false);
   publish(raw_of(picture.stamp_ns, picture.grey), grabbed_ns);
   if (!lossless()) return player_->complete();
@@ -293,7 +297,7 @@ void FrameGrabberService::publish_calibration(const std::optional<dataset::Camer
 }
 
 void FrameGrabberService::publish_clock(int64_t data_ns, int64_t wall_ns, bool ended) {
-  clock_sent_ns_ = wall_ns;
+  clock_sent_ns_ = core::monotonic_ns();
   msg::DataClock clock;
   clock.data_ns(data_ns);
   clock.wall_ns(wall_ns);
@@ -311,8 +315,9 @@ void FrameGrabberService::say_health(uint32_t health) {
   if (unsent_in_a_row_ >= kBadBeforeDegraded)
     return context_.health().degraded("pictures cannot be sent: the middleware takes none; see that /dev/shm has room");
   bad_in_a_row_ = health == 0 ? 0 : bad_in_a_row_ + 1;
+  if (bad_in_a_row_ >= kBadBeforeDegraded) return context_.health().degraded(complaint(health));
+  if (no_host_time_) return context_.health().degraded(kNoHostTime);
   if (bad_in_a_row_ == 0) context_.health().active();
-  if (bad_in_a_row_ >= kBadBeforeDegraded) context_.health().degraded(complaint(health));
 }
 
 void FrameGrabberService::broken(const std::string& why) {

@@ -57,7 +57,7 @@ class FrameGrabberService {
   messaging::SentTotals sent_;
   uint64_t frame_seq_ = 0;
   uint64_t clock_seq_ = 0;
-  int64_t clock_sent_ns_ = 0;
+  int64_t clock_sent_ns_ = 0;  // monotonic
   int64_t newest_ns_ = INT64_MIN;
   std::optional<int64_t> preview_ns_;
   std::optional<int64_t> waiting_since_ns_;
@@ -67,6 +67,7 @@ class FrameGrabberService {
   std::string gave_up_why_;
   int bad_in_a_row_ = 0;
   int unsent_in_a_row_ = 0;
+  bool no_host_time_ = false;  // see RawPicture
   cv::Mat preview_grey_;
   uint64_t bad_packets_ = 0;
   std::unique_ptr<Player> player_;  // last, as the feed: their threads call the context

@@ -2,6 +2,7 @@
 #include <arv.h>
 
 #include <cmath>
+#include <utility>
 
 #include "core/device_clock.hpp"
 #include "core/time.hpp"
@@ -14,6 +15,7 @@ using core::Error;
 using core::Result;
 
 constexpr int kBuffers = 12;
+constexpr int64_t kExposurePeriodNs = core::kNsPerSecond;
 constexpr uint64_t kLargestGap = 1000;  // pictures; more is a camera that began to count anew
 constexpr uint64_t kIds16 = 0xFFFF;     // 65535 is followed by 1
 
@@ -53,7 +55,9 @@ class GenicamCamera final : public LiveCamera {
   Result<std::string> connect() override;
   Result<std::optional<RawPicture>> next(std::chrono::milliseconds patience) override;
   void disconnect() override;
+  uint64_t take_lost() override { return std::exchange(lost_, 0); }
   [[nodiscard]] std::string name() const override { return "camera genicam:" + (id_.empty() ? "any" : id_); }
+  [[nodiscard]] std::string why_silent() const override;
 
  private:
   /// Sets one thing and says what could not be set.
@@ -69,9 +73,11 @@ class GenicamCamera final : public LiveCamera {
   core::Status configure_rate();
   bool enable_ptp();
   core::Status start();
+  void read_exposure();
   RawPicture picture_of(ArvBuffer* buffer);
   int64_t mid_exposure_ns(ArvBuffer* buffer);
-  uint64_t lost_before(uint64_t frame_id);
+  [[nodiscard]] bool shows_host_time(ArvBuffer* buffer) const;
+  void count_lost_before(uint64_t frame_id);
 
   std::string id_;
   LiveConfig config_;
@@ -79,8 +85,11 @@ class GenicamCamera final : public LiveCamera {
   Held<ArvStream> stream_;
   core::DeviceClock clock_;
   std::optional<uint64_t> last_id_;
+  uint64_t lost_ = 0;        // pictures, not yet told
+  uint64_t incomplete_ = 0;  // since the last whole one
   float exposure_s_ = 0;
-  bool host_time_ = false;  // the camera's clock is the host's, by PTP
+  int64_t exposure_read_ns_ = 0;
+  bool has_ptp_ = false;
 };
 
 Result<std::string> GenicamCamera::connect() {
@@ -101,8 +110,7 @@ Result<std::string> GenicamCamera::connect() {
   const auto text = [](const char* word) { return std::string(word == nullptr ? "?" : word); };
   return name() + " is a " + text(arv_camera_get_vendor_name(camera_.get(), nullptr)) + " " +
          text(arv_camera_get_model_name(camera_.get(), nullptr)) + ", " +
-         text(arv_camera_get_pixel_format_as_string(camera_.get(), nullptr)) +
-         (host_time_ ? ", its clock follows PTP" : "");
+         text(arv_camera_get_pixel_format_as_string(camera_.get(), nullptr)) + (has_ptp_ ? ", its PTP is on" : "");
 }
 
 core::Status GenicamCamera::configure() {
@@ -114,12 +122,12 @@ core::Status GenicamCamera::configure() {
     arv_camera_set_pixel_format_from_string(camera, config_.pixel_format.c_str(), error);
   });
   if (!status.ok()) return status;
-  if (config_.width_px > 0 && config_.height_px > 0) {
-    status = set("a region of " + std::to_string(config_.width_px) + "x" + std::to_string(config_.height_px),
-                 [&](GError** error) {
-                   arv_camera_set_region(camera, -1, -1, static_cast<int>(config_.width_px),
-                                         static_cast<int>(config_.height_px), error);
-                 });
+  if (config_.width_px > 0 || config_.height_px > 0) {  // 0 leaves that one as it is
+    const auto side = [](int64_t px) { return px > 0 ? std::to_string(px) : "any"; };
+    status = set("a region of " + side(config_.width_px) + "x" + side(config_.height_px), [&](GError** error) {
+      arv_camera_set_region(camera, -1, -1, static_cast<int>(config_.width_px), static_cast<int>(config_.height_px),
+                            error);
+    });
     if (!status.ok()) return status;
   }
   if (arv_camera_is_gv_device(camera) && config_.packet_size > 0) {
@@ -128,7 +136,7 @@ core::Status GenicamCamera::configure() {
       arv_camera_gv_set_packet_size(camera, static_cast<int>(config_.packet_size), error);
     });
   }
-  host_time_ = config_.ptp && enable_ptp();
+  has_ptp_ = config_.ptp && enable_ptp();
   return status;
 }
 
@@ -180,23 +188,35 @@ core::Status GenicamCamera::start() {
   if (!stream_) return Error{name() + " cannot send pictures: " + said.text()};
   const size_t payload = arv_camera_get_payload(camera_.get(), said);
   for (int i = 0; i < kBuffers; ++i) arv_stream_push_buffer(stream_.get(), arv_buffer_new(payload, nullptr));
-  const double exposure_us = arv_camera_get_exposure_time(camera_.get(), nullptr);
-  exposure_s_ = static_cast<float>(exposure_us > 0 ? exposure_us * 1e-6 : 0);
+  read_exposure();
   clock_ = core::DeviceClock();
   last_id_.reset();
+  incomplete_ = 0;
   arv_camera_start_acquisition(camera_.get(), said);
   if (said.failed()) return Error{name() + " does not start: " + said.text()};
   return {};
 }
 
+void GenicamCamera::read_exposure() {
+  const double exposure_us = arv_camera_get_exposure_time(camera_.get(), nullptr);
+  exposure_s_ = static_cast<float>(exposure_us > 0 ? exposure_us * 1e-6 : 0);
+  exposure_read_ns_ = core::monotonic_ns();
+}
+
 Result<std::optional<RawPicture>> GenicamCamera::next(std::chrono::milliseconds patience) {
+  // An automatic one changes by a factor of ten where a tunnel begins.
+  if (config_.exposure_us <= 0 && core::monotonic_ns() - exposure_read_ns_ >= kExposurePeriodNs) read_exposure();
   const auto patience_us = std::chrono::duration_cast<std::chrono::microseconds>(patience).count();
   ArvBuffer* buffer = arv_stream_timeout_pop_buffer(stream_.get(), static_cast<uint64_t>(patience_us));
   if (buffer == nullptr) return std::optional<RawPicture>();
-  if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS) {  // shows as a gap at the next good one
+  if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS) {
+    count_lost_before(arv_buffer_get_frame_id(buffer));
+    ++lost_;
+    ++incomplete_;
     arv_stream_push_buffer(stream_.get(), buffer);
     return std::optional<RawPicture>();
   }
+  incomplete_ = 0;
   RawPicture picture = picture_of(buffer);
   if (picture.bytes == nullptr) return Error{name() + " sends broken pictures; set pixel_format and packet_size anew"};
   return std::optional<RawPicture>(std::move(picture));
@@ -218,7 +238,9 @@ RawPicture GenicamCamera::picture_of(ArvBuffer* buffer) {
   }
   picture.exposure_s = exposure_s_;
   picture.stamp_ns = mid_exposure_ns(buffer);
-  picture.lost = lost_before(arv_buffer_get_frame_id(buffer));
+  picture.no_host_time = config_.ptp && !shows_host_time(buffer);
+  count_lost_before(arv_buffer_get_frame_id(buffer));
+  picture.lost = take_lost();
   if (ARV_IS_GV_STREAM(stream_.get())) {
     arv_gv_stream_get_statistics(ARV_GV_STREAM(stream_.get()), nullptr, &picture.bad_packets);
   }
@@ -230,7 +252,7 @@ int64_t GenicamCamera::mid_exposure_ns(ArvBuffer* buffer) {
   const auto camera_ns = static_cast<int64_t>(arv_buffer_get_timestamp(buffer));
   const auto arrival_ns = static_cast<int64_t>(arv_buffer_get_system_timestamp(buffer));
   const int64_t half_ns = core::to_ns(exposure_s_ / 2);
-  if (host_time_ && std::abs(camera_ns - arrival_ns) < core::kNsPerSecond) return camera_ns + half_ns;
+  if (shows_host_time(buffer)) return camera_ns + half_ns;
   const core::HostTime now = core::host_time();
   const int64_t waited_ns =
       std::clamp<int64_t>(now.wall_ns - arrival_ns, 0, core::kNsPerSecond);  // the clock may be set
@@ -238,14 +260,27 @@ int64_t GenicamCamera::mid_exposure_ns(ArvBuffer* buffer) {
          core::to_ns(config_.latency_ms * 1e-3);
 }
 
-uint64_t GenicamCamera::lost_before(uint64_t frame_id) {
+/// By PTP; not while it is not locked, nor of a master that gives another time, as TAI.
+bool GenicamCamera::shows_host_time(ArvBuffer* buffer) const {
+  const auto camera_ns = static_cast<int64_t>(arv_buffer_get_timestamp(buffer));
+  const auto arrival_ns = static_cast<int64_t>(arv_buffer_get_system_timestamp(buffer));
+  return has_ptp_ && std::abs(camera_ns - arrival_ns) < core::kNsPerSecond;
+}
+
+std::string GenicamCamera::why_silent() const {
+  if (incomplete_ == 0) return "";
+  return "sends only incomplete pictures (" + std::to_string(incomplete_) +
+         "); check live.packet_size against the network card's MTU, and the cable";
+}
+
+void GenicamCamera::count_lost_before(uint64_t frame_id) {
   uint64_t gap = 1;
   if (last_id_) {
     const bool wrapped = frame_id < *last_id_ && *last_id_ <= kIds16;
     gap = (wrapped ? frame_id + kIds16 : frame_id) - *last_id_;
   }
   last_id_ = frame_id;
-  return gap > 0 && gap < kLargestGap ? gap - 1 : 0;
+  if (gap > 0 && gap < kLargestGap) lost_ += gap - 1;
 }
 
 void GenicamCamera::disconnect() {

@@ -37,8 +37,12 @@ class LiveCamera {
   virtual void disconnect() = 0;
   /// Makes connect() and next() return soon, now and from now on. The only one that another thread may call.
   virtual void cancel() {}
+  /// Pictures that did not come, or not whole, and that no picture has told of (RawPicture::lost).
+  virtual uint64_t take_lost() { return 0; }
   /// "camera genicam:GV01", for messages.
   [[nodiscard]] virtual std::string name() const = 0;
+  /// Behind the name: why nothing may come, and what to do; empty = not known.
+  [[nodiscard]] virtual std::string why_silent() const { return ""; }
 };
 
 /// "genicam:ID or address" (any = the first that is found), "capture:DEVICE, PIPELINE, URL or FILE"; nullptr for a

@@ -28,12 +28,17 @@ core::DeviceFeed::Device LiveFeed::device() {
 core::Result<bool> LiveFeed::take(std::chrono::milliseconds patience) {
   auto next = camera_->next(patience);
   if (!next.ok()) return next.error();
-  if (!next.value()) return false;
+  if (!next.value()) {
+    if (const uint64_t lost = camera_->take_lost(); lost > 0) events_.lost(lost);
+    return false;
+  }
   hand_over(std::move(*std::move(next).value()));
   return true;
 }
 
 std::string LiveFeed::why_silent() const {
+  if (const std::string why = camera_->why_silent(); !why.empty())
+    return camera_->name() + " " + why + "; it is tried again";
   char text[200];
   std::snprintf(text, sizeof text, " sends no picture for %.1f s; check cable and power%s, it is tried again",
                 config_.silent_s, config_.trigger.empty() ? "" : ", and that its trigger fires");

@@ -15,6 +15,7 @@ struct LiveEvents {
   std::function<void(const std::string& what)> connected;
   std::function<void(const std::string& why)> gone;  // also when connecting fails; each reason once
   std::function<void(RawPicture picture)> picture;   // LiveFeed::finished() when it has been dealt with
+  std::function<void(uint64_t pictures)> lost;       // beside those that the next picture tells of
 };
 
 class LiveFeed {

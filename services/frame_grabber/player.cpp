@@ -76,6 +76,7 @@ std::optional<int64_t> pass_over(dataset::PictureSource& source, std::optional<i
 Player::Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, size_t read_ahead, PlayerEvents events,
                std::optional<int64_t> began_ns)
     : real_pace_(real_pace),
+      wall_minus_monotonic_ns_(core::wall_ns() - core::monotonic_ns()),
       anchor_ns_(real_pace ? pass_over(*source, began_ns) : std::nullopt),
       events_(std::move(events)),
       pictures_(std::move(source), read_ahead,
@@ -84,7 +85,7 @@ Player::Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, s
 
 bool Player::too_late(int64_t stamp_ns, int64_t decode_ns) const {
   const int64_t offset_ns = wall_minus_data_ns_;
-  return real_pace_ && offset_ns != kNotBegun && core::wall_ns() + decode_ns > stamp_ns + offset_ns;
+  return real_pace_ && offset_ns != kNotBegun && now_ns() + decode_ns > stamp_ns + offset_ns;
 }
 
 Player::~Player() {
@@ -103,10 +104,13 @@ void Player::complete() {
   changed_.notify_all();
 }
 
-bool Player::wait_until(int64_t wall_ns) {
+int64_t Player::now_ns() const {
+  return core::monotonic_ns() + wall_minus_monotonic_ns_;
+}
+
+bool Player::wait_until(int64_t due_ns) {
   std::unique_lock lock(mutex_);
-  // On the steady clock, so that a step of the wall clock moves at most this one picture.
-  const auto due = std::chrono::steady_clock::now() + std::chrono::nanoseconds(wall_ns - core::wall_ns());
+  const auto due = std::chrono::steady_clock::now() + std::chrono::nanoseconds(due_ns - now_ns());
   return !changed_.wait_until(lock, due, [this] { return stopped_; });
 }
 
@@ -133,7 +137,7 @@ void Player::play() {
     if (!item.picture.value()) return events_.ended();
     dataset::Picture picture = std::move(*std::move(item.picture).value());
     if (real_pace_) {
-      const auto verdict = pace.ask(picture.stamp_ns, core::wall_ns());
+      const auto verdict = pace.ask(picture.stamp_ns, now_ns());
       wall_minus_data_ns_ = pace.wall_minus_data_ns();
       if (verdict.skip) {
         events_.late(picture.stamp_ns);

@@ -74,10 +74,13 @@ class Player {
 
  private:
   void play();
-  bool wait_until(int64_t wall_ns);  // false: stopped
+  /// The wall clock as it went when playing began: one that is set meanwhile moves no picture.
+  [[nodiscard]] int64_t now_ns() const;
+  bool wait_until(int64_t due_ns);  // false: stopped
   bool wait_complete();
   bool too_late(int64_t stamp_ns, int64_t decode_ns) const;
   bool real_pace_;
+  int64_t wall_minus_monotonic_ns_;
   std::optional<int64_t> anchor_ns_;  // wall clock minus stamp, where it is known beforehand
   PlayerEvents events_;
   std::mutex mutex_;

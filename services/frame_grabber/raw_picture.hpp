@@ -30,10 +30,11 @@ std::string pixel_format_names();
 size_t bytes_of_row(PixelFormat format, int width_px);
 
 struct RawPicture {
-  int64_t stamp_ns = 0;      // mid-exposure, Unix epoch
-  float exposure_s = 0;      // 0 = not known
-  uint64_t lost = 0;         // pictures of the camera that never came, since the last one
-  uint64_t bad_packets = 0;  // network packets that never came, since the camera was connected
+  int64_t stamp_ns = 0;       // mid-exposure, Unix epoch
+  float exposure_s = 0;       // 0 = not known
+  uint64_t lost = 0;          // pictures of the camera that never came, since the last one
+  uint64_t bad_packets = 0;   // network packets that never came, since the camera was connected
+  bool no_host_time = false;  // its stamp should be the camera's by PTP, but is that of its arrival
   cv::Size size;
   PixelFormat format = PixelFormat::mono8;
   const uint8_t* bytes = nullptr;

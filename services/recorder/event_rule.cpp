@@ -171,8 +171,10 @@ bool EventRule::begins(const StoredSample& sample) {
       value = &(*value)[name];
     }
   }
+  const bool now = holds(*value, operation_, value_);
+  if (is_said_once(sample.channel->topic)) return now;
   const std::string key = key_of(*sample.channel, decoded.value());
-  if (!holds(*value, operation_, value_)) {
+  if (!now) {
     fulfilled_.erase(key);
     return false;
   }

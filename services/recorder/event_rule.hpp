@@ -21,8 +21,8 @@ class EventRule {
                                        const std::function<std::string(const std::string& topic)>& type_of);
 
   [[nodiscard]] bool concerns(const std::string& topic) const;
-  /// True for a sample that fulfils the rule while the one before it (of the same DDS key) did not. A value that is not
-  /// known (NaN) fulfils no rule.
+  /// True for a sample that fulfils the rule while the one before it (of the same DDS key) did not; of what is said
+  /// once, as a line of a log, for each that does. A value that is not known (NaN) fulfils no rule.
   bool begins(const StoredSample& sample);
   [[nodiscard]] const std::string& text() const { return text_; }
 

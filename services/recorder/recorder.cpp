@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/time.hpp"
+#include "recorder/standing.hpp"
 
 namespace railfix::recorder {
 
@@ -26,6 +27,11 @@ Recorder::Recorder(const RecorderConfig& config, messaging::Participant& partici
     : config_(config), maker_(config, about), on_picture_(std::move(on_picture)) {
   for (const auto& rule : config_.events) {
     rules_.push_back(core::value_or_throw(EventRule::parse(rule, type_of_topic)));
+  }
+  for (const auto& topic : config_.leave_out) {
+    if (messaging::find_topic(topic) == nullptr)
+      throw core::BadInput("recorder.leave_out names the topic '" + topic +
+                           "', which there is not; `railfix topics qos` shows all");
   }
   // With `file` the folder belongs to somebody else.
   const bool ours = config_.file.empty();
@@ -55,7 +61,7 @@ Recorder::~Recorder() {
 void Recorder::close_all() {
   (void)in_thread([this] { return recording_ ? end() : std::string(); });
   (void)in_thread([this] {
-    inlet_->close();
+    drain([this] { inlet_->close(); });
     tend_event_files(true);
     return std::string();
   });
@@ -67,7 +73,9 @@ void Recorder::close_all() {
 core::Result<std::string> Recorder::in_thread(const std::function<core::Result<std::string>()>& work) {
   std::promise<core::Result<std::string>> promise;
   auto result = promise.get_future();
-  queue_.push(nullptr, [&] {
+  const std::function<void()> task = [&] {
+    // In the middle of what the thread does with the file by itself, as for a full disk: behind it.
+    if (draining_) return queue_.push(nullptr, task);
     try {
       auto done = work();
       publish_state();
@@ -75,8 +83,15 @@ core::Result<std::string> Recorder::in_thread(const std::function<core::Result<s
     } catch (const std::exception& error) {
       promise.set_value(core::Error{error.what()});
     }
-  });
+  };
+  queue_.push(nullptr, task);
   return result.get();
+}
+
+void Recorder::drain(const std::function<void()>& inlet_does) {
+  draining_ = true;
+  const std::shared_ptr<void> done(nullptr, [this](void*) { draining_ = false; });
+  inlet_does();
 }
 
 core::Result<std::string> Recorder::start(const fs::path& file) {
@@ -85,7 +100,7 @@ core::Result<std::string> Recorder::start(const fs::path& file) {
 
 core::Result<std::string> Recorder::stop() {
   return in_thread([this]() -> core::Result<std::string> {
-    if (!std::exchange(stopped_by_disk_, false)) return end();
+    if (!std::exchange(goes_on_by_itself_, false)) return end();
     problem_.clear();
     return std::string("recording had stopped already, and does not go on by itself");
   });
@@ -113,16 +128,18 @@ RecorderState Recorder::take_state() {
 
 core::Result<std::string> Recorder::begin(const fs::path& file) {
   if (recording_) return core::Error{recording_->file().string() + " is being recorded already; stop it first"};
-  const fs::path name = file.empty() ? maker_.next_name() : file;
+  const fs::path name = file.empty() ? maker_.next_name() : maker_.named(file);
+  if (disk_has_less_than(1, name)) return core::Error{wait_for_room("nothing is recorded: the disk of ", name)};
   count_dropped();  // not of this file
   auto created = maker_.create(name);
+  for (const auto& sentence : maker_.take_warnings()) say(sentence, true);
   if (!created.ok()) {
     problem_ = created.error().message;
     return created.error();
   }
   record_into(std::move(created).value());
   paused_ = false;
-  stopped_by_disk_ = false;
+  goes_on_by_itself_ = false;
   inlet_->want_recorded(true);
   if (inlet_->is_open()) {
     write_standing();
@@ -192,11 +209,7 @@ void Recorder::write_standing() {
 core::Result<std::string> Recorder::end() {
   if (!recording_) return core::Error{"nothing is being recorded"};
   // What waits for the encoder and then for the disk still belongs to the recording.
-  if (ring_) {
-    inlet_->drain();
-  } else {
-    inlet_->close();
-  }
+  drain([this] { ring_ ? inlet_->drain() : inlet_->close(); });
   count_dropped();
   inlet_->want_recorded(false);
   const std::string summary = recording_->file().string() + ": " + std::to_string(recording_->samples()) + " samples";
@@ -218,7 +231,7 @@ core::Result<std::string> Recorder::set_paused(bool paused) {
   if (!recording_) return core::Error{"nothing is being recorded"};
   const std::string file = recording_->file().string();
   if (paused == paused_) return core::Error{file + (paused ? " is paused already" : " is not paused")};
-  inlet_->drain();
+  drain([this] { inlet_->drain(); });
   count_dropped();
   paused_ = paused;
   inlet_->want_recorded(!paused);
@@ -253,7 +266,7 @@ void Recorder::fail(const std::string& why) {
     if (failure_.empty()) failure_ = "the recorder's thread cannot go on: " + why;
     (void)wait_for_closing();
     if (recording_) (void)recording_->close();
-    stopped_by_disk_ = false;
+    goes_on_by_itself_ = false;
     recording_.reset();
     publish_state();
   } catch (const std::exception&) {
@@ -270,37 +283,60 @@ void Recorder::tick() {
   if (recording_) {
     const auto status = recording_->tick(ticked_ns_);
     if (!status.ok()) problem_ = status.error().message;
-    split_if_due();
+    if (recording_->is_removed()) {
+      leave_removed_file();
+    } else {
+      split_if_due();
+    }
   }
-  if (disk_has_less_than(1)) guard_disk();
-  resume_when_there_is_room();
+  guard_disk();
+  go_on_by_itself();
   tend_event_files(false);
   publish_state();
 }
 
-bool Recorder::disk_has_less_than(double times) const {
-  const fs::path file = recording_ ? recording_->file() : maker_.folder() / "";
-  const uint64_t free = free_bytes(file.has_parent_path() ? file.parent_path() : fs::path("."));
-  return static_cast<double>(free) < times * config_.keep_free_mb * kBytesPerMb;
+bool Recorder::disk_has_less_than(double times, const fs::path& file) const {
+  fs::path folder = fs::absolute(file).parent_path();
+  std::error_code failed;
+  while (!fs::exists(folder, failed) && folder.has_relative_path()) folder = folder.parent_path();
+  return static_cast<double>(free_bytes(folder)) < times * config_.keep_free_mb * kBytesPerMb;
+}
+
+fs::path Recorder::file_on_disk() const {
+  return recording_ ? recording_->file() : maker_.folder() / "next";
 }
 
 void Recorder::guard_disk() {
+  const fs::path file = file_on_disk();
+  if (!disk_has_less_than(1, file)) return;
   event_ends_ns_ = 0;
   if (!recording_) return;
-  const std::string file = recording_->file().string();
   const auto ended = end();
-  stopped_by_disk_ = true;
-  const auto free_mb = static_cast<int64_t>(config_.keep_free_mb);
-  problem_ = "recording stopped: the disk of " + file + " has less than " + std::to_string(free_mb) +
-             " MB free; goes on in a new file when " +
-             std::to_string(static_cast<int64_t>(kRoomAgain * config_.keep_free_mb)) + " MB are free";
+  (void)wait_for_room("recording stopped: the disk of ", file);
   if (!ended.ok()) problem_ += "; " + ended.error().message;
 }
 
-void Recorder::resume_when_there_is_room() {
-  if (!stopped_by_disk_ || disk_has_less_than(kRoomAgain)) return;
-  if (const auto begun = begin(""); begun.ok())
-    say("there is room on the disk again: recording " + begun.value(), false);
+std::string Recorder::wait_for_room(const std::string& what, const fs::path& file) {
+  const auto mb = [this](double times) { return std::to_string(static_cast<int64_t>(times * config_.keep_free_mb)); };
+  goes_on_by_itself_ = true;
+  problem_ = what + file.string() + " has less than " + mb(1) + " MB free; goes on in a new file when " +
+             mb(kRoomAgain) + " MB are free";
+  return problem_;
+}
+
+void Recorder::leave_removed_file() {
+  const std::string file = recording_->file().string();
+  (void)end();
+  goes_on_by_itself_ = true;
+  problem_ = file + kActive +
+             " was removed while it was being recorded, and what it held is lost; see who empties the folder, "
+             "recording goes on in a new file";
+  say(problem_, true);
+}
+
+void Recorder::go_on_by_itself() {
+  if (!goes_on_by_itself_ || disk_has_less_than(kRoomAgain, file_on_disk())) return;
+  if (const auto begun = begin(""); begun.ok()) say("recording goes on in " + begun.value(), false);
 }
 
 void Recorder::use(const Arrival& arrival) {
@@ -311,7 +347,8 @@ void Recorder::use(const Arrival& arrival) {
     ring_->add(arrival.ringed, core::monotonic_ns());
     if (event_file_) event_file_->add(arrival.ringed);
   }
-  if (sample) look_for_events(*sample);
+  // What services said long before is in the recording, and no event of now.
+  if (sample && (arrival.live || !is_said_once(arrival.topic))) look_for_events(*sample);
   if (arrival.picture_stamp_ns) on_picture_(*arrival.picture_stamp_ns);
 }
 
@@ -338,6 +375,7 @@ void Recorder::publish_state() {
   now.paused = paused_;
   now.ring = ring_.has_value();
   now.is_wanted = config_.autostart;
+  now.goes_on_by_itself = goes_on_by_itself_;
   now.ring_s = ring_ ? ring_->seconds() : 0;
   now.received = received_;
   now.written = written_;

@@ -21,6 +21,7 @@ struct RecorderState {
   bool paused = false;     // ... and nothing goes into it
   bool ring = false;       // the last seconds are kept in memory
   bool is_wanted = false;  // it records from the beginning: without a file somebody, or a full disk, has stopped it
+  bool goes_on_by_itself = false;  // not recording, and waits for the disk
   std::string file;
   int64_t started_ns = 0;  // of the file
   uint64_t messages = 0;   // in the file
@@ -52,7 +53,8 @@ struct RecorderState {
 class Recorder {
  public:
   /// `on_picture` is called from the recorder's thread with the stamp of each picture that was dealt with. Throws
-  /// BadInput for an event rule that cannot be meant, or a topic that cannot be read.
+  /// BadInput for an event rule that cannot be meant, a topic to leave out that there is not, or one that cannot be
+  /// read.
   Recorder(const RecorderConfig& config, messaging::Participant& participant,
            const std::map<std::string, std::string>& about, std::function<void(int64_t stamp_ns)> on_picture);
   /// Closes all files.
@@ -74,6 +76,8 @@ class Recorder {
  private:
   void close_all();
   core::Result<std::string> in_thread(const std::function<core::Result<std::string>()>& work);
+  /// Waits for what the inlet still has, while no command is carried out.
+  void drain(const std::function<void()>& inlet_does);
   core::Result<std::string> begin(const std::filesystem::path& file);
   void record_into(std::unique_ptr<Recording> recording);
   core::Result<std::string> end();
@@ -86,9 +90,14 @@ class Recorder {
   void tick();
   void count_dropped();
   void guard_disk();
-  void resume_when_there_is_room();
-  /// Less than so many times keep_free_mb are free.
-  [[nodiscard]] bool disk_has_less_than(double times) const;
+  void leave_removed_file();
+  void go_on_by_itself();
+  /// Less than so many times keep_free_mb are free where this file is or would be.
+  [[nodiscard]] bool disk_has_less_than(double times, const std::filesystem::path& file) const;
+  /// The open one, or some other where the next one would be.
+  [[nodiscard]] std::filesystem::path file_on_disk() const;
+  /// The sentence, which is the problem until it goes on.
+  std::string wait_for_room(const std::string& what, const std::filesystem::path& file);
   void publish_state();
   void use(const Arrival& arrival);
   void record(const Arrival& arrival);
@@ -109,7 +118,8 @@ class Recorder {
   std::unique_ptr<TopicInlet> inlet_;
   std::unique_ptr<Recording> recording_;
   bool paused_ = false;
-  bool stopped_by_disk_ = false;       // begins again by itself
+  bool draining_ = false;
+  bool goes_on_by_itself_ = false;     // stopped by what may pass: a full disk, a removed file
   std::future<core::Status> closing_;  // the file before
   int64_t opened_monotonic_ns_ = 0;    // `recording_`
   int64_t opened_wall_ns_ = 0;

@@ -52,7 +52,7 @@ core::Result<std::string> Recorder::happened(const EventNote& note, bool by_hand
   if (!by_hand) return "marked in " + file;
   const auto status = housekeeper_->protect(file, "event: " + note.text);
   if (!status.ok()) return status.error();
-  return "marked in " + status.value();
+  return "marked in " + file + ", which is protected now";
 }
 
 core::Result<std::string> Recorder::keep_event(const EventNote& note, bool by_hand) {
@@ -65,7 +65,8 @@ core::Result<std::string> Recorder::keep_event(const EventNote& note, bool by_ha
   }
   event_ends_ns_ = 0;
   tend_event_files(false);
-  if (disk_has_less_than(1)) return core::Error{"no file for it: the disk has less than keep_free_mb free"};
+  if (disk_has_less_than(1, file_on_disk()))
+    return core::Error{"no file for it: the disk has less than keep_free_mb free"};
   if (!by_hand && static_cast<double>(housekeeper_->survey().event_bytes) >= config_.events_mb * kBytesPerMb) {
     return core::Error{"no file for it: the files of events take more than events_mb; remove some"};
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <fstream>
 #include <stdexcept>
 
 #include "core/time.hpp"
@@ -41,10 +42,16 @@ RecorderService::RecorderService(const Config& config, service::Context& context
   add_commands();
   context_.every(kStatePeriod, [this] { show_state(); });
   context_.at_stop([this] {
-    if (recorder_.state().recording) (void)stop();
+    const bool closed = !recorder_.state().recording || stop().ok();
     show_state();
+    // Whoever started it must not take the recording for one that is there.
+    if (!closed) throw std::runtime_error("the recording could not be closed: see the error before");
   });
-  if (config_.autostart) core::value_or_throw(start(""));
+  if (config_.autostart) {
+    const auto started = start("");
+    if (!started.ok() && !recorder_.state().goes_on_by_itself) throw core::BadInput(started.error().message);
+  }
+  for (const auto& file : {config_.map, config_.train_file}) warn_if_unreadable(file);
   recorder_.housekeeper().recover();  // takes minutes for a large file: what is recorded now comes first
 }
 
@@ -79,6 +86,12 @@ std::map<std::string, std::string> RecorderService::about() const {
           {"pictures", config_.pictures},
           {"map", fingerprint(config_.map)},
           {"configuration", fingerprint(config_.train_file)}};
+}
+
+void RecorderService::warn_if_unreadable(const std::string& file) {
+  if (file.empty() || std::ifstream(file)) return;
+  context_.log().warn(
+      "{} cannot be read, so recordings will not say which it was; correct recorder.map or recorder.train_file", file);
 }
 
 core::Result<std::string> RecorderService::start(const std::string& file) {

@@ -15,6 +15,7 @@ class RecorderService {
  private:
   [[nodiscard]] std::map<std::string, std::string> about() const;
   void add_commands();
+  void warn_if_unreadable(const std::string& file);
   core::Result<std::string> logged(core::Result<std::string> done);
   core::Result<std::string> start(const std::string& file);
   core::Result<std::string> stop();

@@ -62,6 +62,9 @@ class Recording {
   core::Status tick(int64_t now_monotonic_ns);
   core::Status close();
 
+  /// See mcap::Writer::is_removed().
+  [[nodiscard]] bool is_removed() const { return writer_->is_removed(); }
+
   [[nodiscard]] uint64_t samples() const { return writer_->statistics().messages; }
   [[nodiscard]] uint64_t bytes() const { return writer_->bytes_written(); }
   [[nodiscard]] uint64_t lost_samples() const;

@@ -4,6 +4,7 @@
 
 #include "core/time.hpp"
 #include "core/whole_file.hpp"
+#include "mcap/reader.hpp"
 #include "recorder/recordings_folder.hpp"
 
 namespace railfix::recorder {
@@ -42,6 +43,14 @@ fs::path RecordingMaker::next_name() {
   return next;
 }
 
+// The working directory of a service is nothing that people know, and no quota or survey looks there.
+fs::path RecordingMaker::named(const fs::path& name) const {
+  if (name.has_parent_path()) return name;
+  fs::path file = folder() / name;
+  if (file.extension() != ".mcap") file += ".mcap";
+  return file;
+}
+
 fs::path RecordingMaker::timed_name() const {
   return new_name(config_.folder, about_.at("train_id"), core::wall_ns());
 }
@@ -61,9 +70,28 @@ const std::map<std::string, std::string>& RecordingMaker::about_next() {
   return about_;
 }
 
+// The folder belongs to somebody else, so nothing in it is recovered; but what was recorded is not ours to destroy.
+void RecordingMaker::put_aside_cut_off(const fs::path& file) {
+  const fs::path cut_off = file.string() + kActive;
+  std::error_code failed;
+  if (!fs::is_regular_file(cut_off, failed) || mcap::being_written(cut_off)) return;
+  fs::path aside;
+  for (int i = 1; aside.empty() || is_taken(aside); ++i) {
+    const std::string number = i == 1 ? "" : "-" + std::to_string(i);
+    aside = file.parent_path() / (file.stem().string() + "-cut-off" + number + file.extension().string());
+  }
+  aside += kActive;
+  fs::rename(cut_off, aside, failed);
+  warnings_.push_back(failed ? cut_off.string() + " was left by a crash, cannot be put aside (" + failed.message() +
+                                   ") and is replaced"
+                             : cut_off.string() + " was left by a crash and is now " + aside.string() +
+                                   "; `railfix recording repair` makes a proper file of it");
+}
+
 core::Result<std::unique_ptr<Recording>> RecordingMaker::create(const fs::path& file) {
   mcap::WriterOptions options = writer_options();
   options.overwrite = !config_.file.empty() && file == config_.file;
+  if (options.overwrite) put_aside_cut_off(file);
   about_["started_ns"] = std::to_string(core::wall_ns());
   auto recording = Recording::create(file, options, about_next());
   const auto text = core::read_whole(config_.train_file);

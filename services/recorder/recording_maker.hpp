@@ -5,6 +5,8 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "recorder/event_file.hpp"
 #include "recorder/recorder_config.hpp"
@@ -22,13 +24,19 @@ class RecordingMaker {
   [[nodiscard]] std::filesystem::path folder() const;
   /// With `recorder.file` that one first, then others beside it.
   [[nodiscard]] std::filesystem::path next_name();
+  /// What people mean by a name: a path as it is, a bare name in the folder of the recordings.
+  [[nodiscard]] std::filesystem::path named(const std::filesystem::path& name) const;
   /// In the folder of the recordings, for this moment.
   [[nodiscard]] std::filesystem::path timed_name() const;
 
+  /// Of the configured file what a crash left of it is put aside first: see take_warnings().
   core::Result<std::unique_ptr<Recording>> create(const std::filesystem::path& file);
   core::Result<std::unique_ptr<EventFile>> create_event_file(const EventNote& note, const Ring::Snapshot& before);
+  /// Since the last call.
+  std::vector<std::string> take_warnings() { return std::exchange(warnings_, {}); }
 
  private:
+  void put_aside_cut_off(const std::filesystem::path& file);
   [[nodiscard]] mcap::WriterOptions writer_options() const;
   /// With the number of the next one.
   const std::map<std::string, std::string>& about_next();
@@ -37,6 +45,7 @@ class RecordingMaker {
   std::map<std::string, std::string> about_;
   uint64_t number_ = 0;      // of the next recording; 0 = the folder is not ours
   bool file_begun_ = false;  // the one that is configured
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace railfix::recorder

@@ -62,6 +62,12 @@ bool is_draft(const Found& found) {
   return fs::exists(found.file.parent_path() / (source + kEnding + kActive), failed);
 }
 
+/// Also of what was recovered; a train may have such a name, too.
+bool is_of_event(const fs::path& recording) {
+  const std::string stem = recording.stem().string();
+  return stem.ends_with(kEventKind) || stem.ends_with(std::string(kEventKind) + kRecovered);
+}
+
 uint64_t number_of(const fs::path& file) {
   const auto about = mcap::metadata_in_front(file, "railfix");
   if (!about || !about->entries.contains(kNumberKey)) return 0;
@@ -124,7 +130,7 @@ Survey survey(const fs::path& folder) {
   for (const Found& found : recordings_in(folder)) {
     ++all.files;
     all.bytes += found.bytes;
-    if (found.recording.stem().string().find(kEventKind) != std::string::npos) all.event_bytes += found.bytes;
+    if (is_of_event(found.recording)) all.event_bytes += found.bytes;
     if (!is_protected(found.recording)) continue;
     ++all.protected_files;
     all.protected_bytes += found.bytes;

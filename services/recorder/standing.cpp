@@ -21,4 +21,8 @@ std::string standing_of(const ChannelOf& channel, const std::vector<uint8_t>& cd
   return sample.ok() ? key_of(channel, sample.value()) : channel.topic;
 }
 
+bool is_said_once(std::string_view topic) {
+  return topic == "log_record" || topic == "service_control" || topic == "service_reply";
+}
+
 }  // namespace railfix::recorder

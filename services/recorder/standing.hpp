@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "recorder/stored_sample.hpp"
 
@@ -12,5 +13,8 @@ std::string key_of(const ChannelOf& channel, const nlohmann::ordered_json& sampl
 
 /// StoredSample::standing of a sample of this channel.
 std::string standing_of(const ChannelOf& channel, const std::vector<uint8_t>& cdr);
+
+/// Topics whose samples are no state that lasts: each says something that happened.
+bool is_said_once(std::string_view topic);
 
 }  // namespace railfix::recorder

@@ -162,6 +162,8 @@ void TopicInlet::listen(const messaging::TopicInfo& topic, const std::string& in
   if (topic.name == "camera_frame") return listen_camera(listening, topic, name, instance);
   messaging::TopicInfo info = topic;
   info.reader_queue = static_cast<size_t>(config_.sample_queue);
+  // Services say why they cannot start before anybody has found them; their writers keep the last lines.
+  if (topic.name == messaging::topics::log_record.name) info.qos.transient_local = true;
   const auto handler = [this, channel = channel_of(topic, *topic.type, name), type = topic.type,
                         since_ns = core::wall_ns()](const Sample& sample, const messaging::SampleInfo& sample_info) {
     const auto one = stored(channel, sample_info, type->serialize(sample.get()));

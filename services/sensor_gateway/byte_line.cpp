@@ -4,6 +4,7 @@
 #include <netdb.h>
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <termios.h>
@@ -85,7 +86,8 @@ core::Status ByteLine::open_serial(const std::string& device, int64_t baud) {
   line.c_cflag |= CLOCAL | CREAD;
   line.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS);
   if (cfsetspeed(&line, find(baud)->speed) != 0 || tcsetattr(file_, TCSANOW, &line) != 0) return why(errno);
-  ioctl(file_, TIOCEXCL);
+  ioctl(file_, TIOCEXCL);  // does not hold up root, nor who has it open already
+  if (flock(file_, LOCK_EX | LOCK_NB) != 0) return core::Error{"another program has it"};
   tcflush(file_, TCIFLUSH);
   return {};
 }

@@ -58,7 +58,7 @@ class GpsdReceiver final : public LiveSensor {
                        "); check that gpsd runs there (`gpspipe -w`), it is tried again"};
   }
 
-  core::Result<std::vector<Sample>> next(std::chrono::milliseconds patience) override {
+  core::Result<Delivery> next(std::chrono::milliseconds patience) override {
     const auto got = line_.read(bytes_, patience);
     if (!got.ok()) {
       return core::Error{name() + " has closed the connection (" + got.error().message +
@@ -74,7 +74,8 @@ class GpsdReceiver final : public LiveSensor {
     }
     if (!reports_.trouble().empty()) return core::Error{name() + " " + reports_.trouble()};
     if (const auto ahead_s = clock_.contradiction_s()) return core::Error{contradiction(*ahead_s)};
-    return samples;
+    const std::string complaint = reports_.complaint();
+    return Delivery{std::move(samples), {}, complaint.empty() ? "" : name() + " " + complaint};
   }
 
   void disconnect() override { line_.close(); }
@@ -87,11 +88,11 @@ class GpsdReceiver final : public LiveSensor {
   /// A receiver that has not yet heard of the time can still tell that it has no position.
   std::optional<int64_t> stamp_of(const GpsdReport& report, const core::HostTime& arrival) {
     if (!report.utc_ns) return arrival.wall_ns - latency_ns_;
-    return clock_.stamp_ns(*report.utc_ns, arrival, core::clock_error_ns().has_value());
+    return clock_.stamp_ns(*report.utc_ns, arrival, core::is_kept(core::clock_error_ns()));
   }
   [[nodiscard]] std::string contradiction(double ahead_s) const {
     return fmt::format(
-        "{}: this computer's clock is {:.0f} s {} the receiver's time, so its positions are not used; see which of the "
+        "{}: this computer's clock is {:.1f} s {} the receiver's time, so its positions are not used; see which of the "
         "two is right (`chronyc tracking`, `gpspipe -w`)",
         name(), std::abs(ahead_s), ahead_s > 0 ? "ahead of" : "behind");
   }

@@ -46,7 +46,10 @@ std::optional<int64_t> utc_ns_of(const std::string& text) {
          seconds * core::kNsPerSecond + core::to_ns(part_s);
 }
 
-// TPV's `status`. A place that is dead reckoned, surveyed or simulated is not measured by satellites.
+constexpr int kMixed = 6;  // satellites and the receiver's own dead reckoning
+
+// TPV's `status`. A place that dead reckoning is mixed into would count IMU and wheel twice. A place that is dead
+// reckoned, surveyed or simulated is not measured by satellites.
 int fix_of(int mode, int status) {
   if (mode < 2) return 0;
   switch (status) {
@@ -55,8 +58,9 @@ int fix_of(int mode, int status) {
     case 4:
       return 5;  // RTK float
     case 5:      // dead reckoning
-    case 7:      // surveyed
-    case 8:      // simulated
+    case kMixed:
+    case 7:  // surveyed
+    case 8:  // simulated
       return 0;
     default:
       return 1;
@@ -94,7 +98,7 @@ void GpsdReports::connected() {
   first_device_.clear();
   devices_.clear();
   trouble_.clear();
-  lacks_quality_ = false;
+  lacks_quality_ = lacks_time_ = is_mixed_ = false;
 }
 
 std::vector<GpsdReport> GpsdReports::read(std::span<const uint8_t> bytes, int64_t arrival_ns) {
@@ -160,12 +164,14 @@ std::optional<GpsdReport> GpsdReports::read_position(const Message& message, int
   if (report.utc_ns && !is_news(*report.utc_ns)) return std::nullopt;
   auto& row = report.row;
   row = {0, kUnknown, kUnknown, kUnknown, kUnknown, fix_of(message.code("mode"), message.code("status"))};
+  is_mixed_ = message.code("mode") >= 2 && message.code("status") == kMixed;
   if (row.fix == 0) return report;
   row.lat_deg = message.number("lat");
   row.lon_deg = message.number("lon");
   row.alt_m = message.number("altMSL");
   const bool on_earth = std::abs(row.lat_deg) <= 90 && std::abs(row.lon_deg) <= 180;
-  if (!on_earth || !report.utc_ns) return std::nullopt;
+  lacks_time_ = on_earth && !report.utc_ns;
+  if (!on_earth || lacks_time_) return std::nullopt;
   lacks_quality_ =
       !quality_ || quality_->device != message.text("device") || arrival_ns - quality_->arrival_ns > kQualityLastsNs;
   if (lacks_quality_) return std::nullopt;
@@ -180,7 +186,16 @@ bool GpsdReports::is_news(int64_t utc_ns) {
   return true;
 }
 
+std::string GpsdReports::complaint() const {
+  if (!is_mixed_) return "";
+  return "mixes its own dead reckoning into its positions (gpsd's status 6), so they are not used; switch the "
+         "receiver's sensor fusion off (u-blox: CFG-SFCORE-USE_SF 0)";
+}
+
 std::string GpsdReports::why_silent() const {
+  if (lacks_time_)
+    return "tells positions without their time and date, which are not used; turn on the receiver's RMC or ZDA (or "
+           "UBX-NAV-PVT) messages";
   if (lacks_quality_)
     return "tells positions without HDOP, which are not used; turn on the receiver's GSA and GSV (or "
            "UBX-NAV-DOP and UBX-NAV-SAT) messages";

@@ -28,6 +28,8 @@ class GpsdReports {
   [[nodiscard]] std::vector<GpsdReport> read(std::span<const uint8_t> bytes, int64_t arrival_ns);
   /// What is wrong with the receivers that gpsd has: nothing can be used until that is mended. Empty = nothing.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
+  /// What is wrong with the positions that come, behind the receiver's name. Empty = nothing.
+  [[nodiscard]] std::string complaint() const;
   /// Why there may be no positions, for a technician.
   [[nodiscard]] std::string why_silent() const;
 
@@ -53,6 +55,8 @@ class GpsdReports {
   };
   std::optional<Quality> quality_;  // also of the connection before: some receivers tell it every few seconds only
   bool lacks_quality_ = false;
+  bool lacks_time_ = false;
+  bool is_mixed_ = false;
   std::optional<int64_t> last_utc_ns_;
 };
 

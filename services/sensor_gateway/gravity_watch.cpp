@@ -11,6 +11,7 @@ namespace railfix::sensor_gateway {
 namespace {
 
 constexpr double kMeanS = 10;
+constexpr double kAgreesAfterS = 1;
 constexpr double kLongestGapS = 1;
 // Cant, gradient, braking and a crooked bracket together tilt the mean by less than 30 degrees.
 constexpr double kLeastUp = 0.866;
@@ -25,18 +26,24 @@ void GravityWatch::add(const dataset::ImuRow& row) {
   last_ns_ = row.stamp_ns;
   if (!since_ns_ || gap_s < 0 || gap_s > kLongestGapS) {
     if (told_by_mean_) before_ = cause();
-    told_by_mean_ = false;
+    agrees_ = told_by_mean_ = false;
     since_ns_ = row.stamp_ns;
     std::copy(std::begin(row.accel_mps2), std::end(row.accel_mps2), mean_mps2_.begin());
     return;
   }
-  told_by_mean_ = core::seconds(row.stamp_ns - *since_ns_) >= kMeanS;
-  const double share = 1 - std::exp(-gap_s / kMeanS);
+  const double age_s = core::seconds(row.stamp_ns - *since_ns_);
+  told_by_mean_ = age_s >= kMeanS;
+  // At first that of all samples: the very first one may be a shock.
+  const double share = std::max(1 - std::exp(-gap_s / kMeanS), gap_s / (age_s + gap_s));
   for (size_t i = 0; i < 3; ++i) mean_mps2_[i] += share * (row.accel_mps2[i] - mean_mps2_[i]);
+  agrees_ = agrees_ || (age_s >= kAgreesAfterS && cause_of_mean().empty());
 }
 
 std::string GravityWatch::cause() const {
-  if (!told_by_mean_) return before_;
+  return told_by_mean_ ? cause_of_mean() : before_;
+}
+
+std::string GravityWatch::cause_of_mean() const {
   const double whole_mps2 = std::hypot(mean_mps2_[0], mean_mps2_[1], mean_mps2_[2]);
   if (whole_mps2 < kFreeFallMps2) return "the IMU feels no gravity; it is broken or of another kind";
   if (whole_mps2 < kLeastMps2 || whole_mps2 > kMostMps2)

@@ -29,14 +29,26 @@ struct LiveConfig {
 /// With its stamp in this host's time.
 using Sample = std::variant<dataset::ImuRow, dataset::WheelRow, dataset::GnssRow>;
 
+/// Messages of a line that can break them; those of others are whole.
+struct Frames {
+  uint64_t whole = 0;
+  uint64_t broken = 0;
+};
+
+struct Delivery {
+  std::vector<Sample> samples;
+  Frames frames;          // since the delivery before
+  std::string complaint;  // of samples that can be sent, but not be used; empty = none
+};
+
 /// Used by one thread. Errors are sentences for a technician: what, where, what to do.
 class LiveSensor {
  public:
   virtual ~LiveSensor() = default;
   /// The text says what was found.
   virtual core::Result<std::string> connect() = 0;
-  /// Empty when nothing came in time; an error when the device is gone or cannot be used as it is.
-  virtual core::Result<std::vector<Sample>> next(std::chrono::milliseconds patience) = 0;
+  /// Without samples when none came in time; an error when the device is gone or cannot be used as it is.
+  virtual core::Result<Delivery> next(std::chrono::milliseconds patience) = 0;
   virtual void disconnect() = 0;
   /// Makes connect() and next() return soon, now and from now on. The only one that another thread may call.
   virtual void cancel() = 0;

@@ -35,9 +35,10 @@ core::DeviceFeed::Device SensorFeed::device(const LiveConfig& config) {
 core::Result<bool> SensorFeed::take(std::chrono::milliseconds patience) {
   auto next = sensor_->next(patience);
   if (!next.ok()) return next.error();
-  if (next.value().empty()) return false;
-  events_.samples(std::move(next).value());
-  return true;
+  Delivery& delivery = next.value();
+  const bool has_samples = !delivery.samples.empty();
+  if (has_samples || delivery.frames.whole + delivery.frames.broken > 0) events_.delivered(std::move(delivery));
+  return has_samples;
 }
 
 }  // namespace railfix::sensor_gateway

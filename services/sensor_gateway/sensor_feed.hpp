@@ -13,7 +13,7 @@ namespace railfix::sensor_gateway {
 struct FeedEvents {
   std::function<void(const std::string& what)> connected;  // once until it is gone
   std::function<void(const std::string& why)> gone;        // also when connecting fails; each reason once
-  std::function<void(std::vector<Sample> samples)> samples;
+  std::function<void(Delivery delivery)> delivered;
 };
 
 class SensorFeed {

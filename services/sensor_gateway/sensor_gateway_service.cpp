@@ -52,7 +52,7 @@ void SensorGatewayService::prepare_played() {
   const auto& sensors = playback_.sensors();
   context_.log().info("has {} IMU, {} wheel and {} GNSS samples", sensors.imu.size(), sensors.wheel.size(),
                       sensors.gnss.size());
-  context_.every(kTick, [this] { play_by_wall_clock(); });
+  context_.every(kTick, [this] { play_on(); });
   if (config_.clock == "follow") {
     context_.on<msg::DataClock>(messaging::topics::data_clock, [this](const msg::DataClock& clock) { follow(clock); });
     // A frame_grabber that is started anew plays from the front: sensors of another time would belong to no picture.
@@ -62,6 +62,7 @@ void SensorGatewayService::prepare_played() {
   clock_.emplace(context_.writer(messaging::topics::data_clock));
   context_.on_command("start", [this](const std::string&) { return start(); });
   if (config_.start == "immediately") {
+    if (!playback_.next_ns()) throw core::BadInput(nothing_to_play());
     context_.post([this] { (void)start(); });
   }
 }
@@ -82,39 +83,45 @@ void SensorGatewayService::follow(const msg::DataClock& clock) {
     anchor_.reset();
     playback_.play_until(clock.data_ns(), sinks_);
   } else {
-    anchor_ = {clock.data_ns(), clock.wall_ns()};
+    anchor_ = {clock.data_ns(), core::monotonic_ns() - (core::wall_ns() - clock.wall_ns())};
   }
   if (clock.ended() != 0) end();
 }
 
+std::string SensorGatewayService::nothing_to_play() const {
+  return config_.source +
+         " has no IMU, wheel or GNSS samples to play; give a dataset folder with mav0/imu0, wheel0 or "
+         "gnss0 whose tables have rows, and see that none is switched off";
+}
+
 core::Result<std::string> SensorGatewayService::start() {
   const auto first = playback_.next_ns();
-  if (!first) return core::Error{config_.source + " has no IMU, wheel or GNSS samples to play"};
+  if (!first) return core::Error{nothing_to_play()};
   if (anchor_) return std::string("plays already");
   begin(*first);
-  anchor_ = {*first, core::wall_ns()};
+  anchor_ = {*first, core::monotonic_ns()};
   return std::string("plays ") + config_.source;
 }
 
-void SensorGatewayService::play_by_wall_clock() {
+void SensorGatewayService::play_on() {
   if (!anchor_) return;
-  const int64_t wall_ns = core::wall_ns();
-  const int64_t data_ns = anchor_->data_ns + (wall_ns - anchor_->wall_ns);
+  const int64_t now_ns = core::monotonic_ns();
+  const int64_t data_ns = anchor_->data_ns + (now_ns - anchor_->monotonic_ns);
   playback_.play_until(data_ns, sinks_);
   if (!clock_) return;
   if (!playback_.next_ns()) {
-    publish_clock(data_ns, wall_ns, true);
+    publish_clock(data_ns, true);
     anchor_.reset();
     return end();
   }
-  if (wall_ns - clock_sent_ns_ >= service::DataTime::kPeriodNs) publish_clock(data_ns, wall_ns, false);
+  if (now_ns - clock_sent_ns_ >= service::DataTime::kPeriodNs) publish_clock(data_ns, false);
 }
 
-void SensorGatewayService::publish_clock(int64_t data_ns, int64_t wall_ns, bool ended) {
-  clock_sent_ns_ = wall_ns;
+void SensorGatewayService::publish_clock(int64_t data_ns, bool ended) {
+  clock_sent_ns_ = core::monotonic_ns();
   msg::DataClock clock;
   clock.data_ns(data_ns);
-  clock.wall_ns(wall_ns);
+  clock.wall_ns(core::wall_ns());
   clock.seq(++clock_seq_);
   clock.ended(ended ? 1 : 0);
   clock_->write(clock);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "sensor_gateway/frame_watch.hpp"
 #include "sensor_gateway/gravity_watch.hpp"
 #include "sensor_gateway/playback.hpp"
 #include "sensor_gateway/sensor_feed.hpp"
@@ -24,14 +25,16 @@ class SensorGatewayService {
   void prepare_played();
   void prepare_live();
   void feed_from(std::unique_ptr<LiveSensor> sensor);
-  void take(const std::string& source, const std::vector<Sample>& samples);
+  void take(const std::string& source, const Delivery& delivery);
+  void hear(const Sample& sample);
   void say_live();
-  [[nodiscard]] bool usable(const Sample& sample);
+  [[nodiscard]] std::string live_troubles();
   void follow(const msg::DataClock& clock);
+  [[nodiscard]] std::string nothing_to_play() const;
   core::Result<std::string> start();
   void begin(int64_t from_ns);
-  void play_by_wall_clock();
-  void publish_clock(int64_t data_ns, int64_t wall_ns, bool ended);
+  void play_on();
+  void publish_clock(int64_t data_ns, bool ended);
   void end();
   void tell_unplayed();
   void watch_gravity(const dataset::ImuRow& row);
@@ -41,7 +44,7 @@ class SensorGatewayService {
 
   struct Anchor {
     int64_t data_ns;
-    int64_t wall_ns;
+    int64_t monotonic_ns;  // the wall clock may be set
   };
   Config config_;
   service::Context& context_;
@@ -58,17 +61,19 @@ class SensorGatewayService {
   uint64_t wheel_seq_ = 0;
   uint64_t gnss_seq_ = 0;
   uint64_t clock_seq_ = 0;
-  int64_t clock_sent_ns_ = 0;
-  struct Wanted {  // a live sensor
+  int64_t clock_sent_ns_ = 0;  // monotonic
+  struct Wanted {              // a live sensor
     std::string source;
-    bool heard = false;
-    int64_t heard_ns = 0;  // monotonic; at first since when it is waited for
+    bool used = false;
+    int64_t heard_ns = 0;  // monotonic; before its first sample, since when it is waited for
   };
   std::array<Wanted, std::variant_size_v<Sample>> wanted_;  // in the order of Sample
   GravityWatch gravity_watch_;
   bool gravity_told_ = false;
-  std::map<std::string, std::string> troubles_;     // of each source, since its last sample
-  std::vector<std::unique_ptr<SensorFeed>> feeds_;  // last: their threads call the context
+  std::map<std::string, std::string> troubles_;      // of each source, since its last sample
+  std::map<std::string, std::string> complaints_;    // of each source, of its last samples
+  std::map<std::string, FrameWatch> frame_watches_;  // of each source
+  std::vector<std::unique_ptr<SensorFeed>> feeds_;   // last: their threads call the context
 };
 
 }  // namespace railfix::sensor_gateway

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <numbers>
+#include <utility>
 
 #include "core/time.hpp"
 #include "core/train_limits.hpp"
@@ -14,6 +15,7 @@ constexpr uint8_t kSync[] = {0xB5, 0x62};
 constexpr size_t kHead = 6;               // sync, class, id, length
 constexpr size_t kAround = kHead + 2;     // and the checksum
 constexpr size_t kLongestPayload = 4096;  // longer ones are taken for garbage: a wrong length must not hold up the line
+constexpr size_t kLongestMeas = 136;      // 31 measurements, and the tag of a calibration
 constexpr uint8_t kEsf = 0x10;
 constexpr uint8_t kMeas = 0x02;
 constexpr size_t kMeasHead = 8;
@@ -21,7 +23,8 @@ constexpr uint32_t kCalibTagValid = 1U << 3U;
 constexpr uint32_t kBackward = 1U << 23U;
 constexpr uint32_t kTicks = kBackward - 1;
 constexpr int64_t kNsPerMs = 1'000'000;
-constexpr int64_t kTogetherNs = 20 * kNsPerMs;  // rates and accelerations of one sample
+constexpr int64_t kTogetherNs = 20 * kNsPerMs;  // rates and accelerations of one sample, of two messages
+constexpr uint64_t kBrokenLine = 3;             // frames in a row
 constexpr int64_t kSameClockNs = core::kNsPerSecond;
 constexpr double kRpsPerBit = std::numbers::pi / 180 / 4096;  // 2^-12 deg/s
 constexpr double kMps2PerBit = 1.0 / 1024;
@@ -38,6 +41,13 @@ int32_t signed24(uint32_t data) {
   return static_cast<int32_t>(data << 8U) >> 8;
 }
 
+/// Of the frame with this head; nothing when no frame has such a one.
+std::optional<size_t> size_of_frame(std::span<const uint8_t> head) {
+  const size_t length = little(head, 4, 2);
+  const size_t longest = head[2] == kEsf && head[3] == kMeas ? kLongestMeas : kLongestPayload;
+  return length <= longest ? std::optional(length + kAround) : std::nullopt;
+}
+
 bool checksum_holds(std::span<const uint8_t> frame) {
   uint8_t a = 0;
   uint8_t b = 0;
@@ -46,6 +56,22 @@ bool checksum_holds(std::span<const uint8_t> frame) {
     b = static_cast<uint8_t>(b + a);
   }
   return a == frame[frame.size() - 2] && b == frame[frame.size() - 1];
+}
+
+bool is_whole_frame(std::span<const uint8_t> bytes) {
+  if (bytes.size() < kHead || bytes[0] != kSync[0] || bytes[1] != kSync[1]) return false;
+  const auto size = size_of_frame(bytes);
+  return size && *size <= bytes.size() && checksum_holds(bytes.first(*size));
+}
+
+/// Where behind its first byte a whole frame begins; 0 = nowhere.
+size_t whole_frame_within(std::span<const uint8_t> bytes) {
+  for (size_t at = 1; at < bytes.size(); ++at) {
+    at = static_cast<size_t>(std::find(bytes.begin() + static_cast<std::ptrdiff_t>(at), bytes.end(), kSync[0]) -
+                             bytes.begin());
+    if (is_whole_frame(bytes.subspan(at))) return at;
+  }
+  return 0;
 }
 
 /// Index in UbxReadings::axes_; nothing for what is no axis.
@@ -69,7 +95,9 @@ int64_t UbxReadings::Tag::ns(uint32_t tag_ms) {
 void UbxReadings::connected() {
   pending_.clear();
   axes_ = {};
+  together_ns_ = kTogetherNs;
   has_bytes_ = has_frames_ = has_measurements_ = false;
+  broken_in_a_row_ = 0;
 }
 
 std::vector<Sample> UbxReadings::read(std::span<const uint8_t> bytes, int64_t arrival_ns) {
@@ -82,21 +110,36 @@ std::vector<Sample> UbxReadings::read(std::span<const uint8_t> bytes, int64_t ar
   return samples;
 }
 
-/// How many bytes are dealt with; 0 = more must come. Behind a frame that is none it goes on with its second byte.
+/// How many bytes are dealt with; 0 = more must come. Behind a frame that is none it goes on with its second byte, or
+/// with the whole frame within it: it has a wrong length, and what it lacks would be waited for.
 size_t UbxReadings::read_frame(std::span<const uint8_t> bytes, int64_t arrival_ns, std::vector<Sample>& samples) {
   const auto begin = std::find(bytes.begin(), bytes.end(), kSync[0]);
   if (begin != bytes.begin()) return static_cast<size_t>(begin - bytes.begin());
   if (bytes.size() < 2) return 0;
   if (bytes[1] != kSync[1]) return 1;
   if (bytes.size() < kHead) return 0;
-  const size_t length = little(bytes, 4, 2);
-  if (length > kLongestPayload) return 1;
-  if (bytes.size() < length + kAround) return 0;
-  const auto frame = bytes.first(length + kAround);
-  if (!checksum_holds(frame)) return 1;
+  const auto size = size_of_frame(bytes);
+  if (!size) return broken(1);
+  const auto frame = bytes.first(std::min(*size, bytes.size()));
+  if (const size_t within = whole_frame_within(frame); within > 0) return broken(within);
+  if (frame.size() < *size) return 0;
+  if (!checksum_holds(frame)) return broken(1);
+  ++frames_.whole;
+  broken_in_a_row_ = 0;
   has_frames_ = true;
-  if (frame[2] == kEsf && frame[3] == kMeas) read_measurements(frame.subspan(kHead, length), arrival_ns, samples);
+  if (frame[2] == kEsf && frame[3] == kMeas)
+    read_measurements(frame.subspan(kHead, *size - kAround), arrival_ns, samples);
   return frame.size();
+}
+
+size_t UbxReadings::broken(size_t bytes) {
+  ++frames_.broken;
+  ++broken_in_a_row_;
+  return bytes;
+}
+
+Frames UbxReadings::take_frames() {
+  return std::exchange(frames_, {});
 }
 
 void UbxReadings::read_measurements(std::span<const uint8_t> payload, int64_t arrival_ns,
@@ -118,21 +161,28 @@ void UbxReadings::read_measurements(std::span<const uint8_t> payload, int64_t ar
     } else if (const auto axis = axis_of(type)) {
       has_measurements_ = true;
       if (!imu_ns) imu_ns = imu_tag_.ns(tag_ms);
-      axes_[*axis] = {signed24(data) * (*axis < 3 ? kRpsPerBit : kMps2PerBit), *imu_ns, true};
+      set_axis(axes_[*axis], {signed24(data) * (*axis < 3 ? kRpsPerBit : kMps2PerBit), *imu_ns, true});
     }
   }
-  if (imu_ns) add_imu(samples);
+  if (imu_ns) add_imu(*imu_ns, samples);
 }
 
-// Rates and accelerations come in one message or in two.
-void UbxReadings::add_imu(std::vector<Sample>& samples) {
-  const auto [oldest, newest] =
-      std::minmax_element(axes_.begin(), axes_.end(), [](const Axis& a, const Axis& b) { return a.tag_ns < b.tag_ns; });
+// Nearer than half its period is only what belongs to the same sample.
+void UbxReadings::set_axis(Axis& axis, const Axis& now) {
+  const int64_t period_ns = now.tag_ns - axis.tag_ns;
+  if (axis.tag_ns != 0 && period_ns > 0) together_ns_ = std::min(together_ns_, period_ns / 2);
+  axis = now;
+}
+
+// Rates and accelerations come in one message or in two. What another message's loss has left alone is no part of a
+// later sample: one pair that is apart would make all behind it so.
+void UbxReadings::add_imu(int64_t tag_ns, std::vector<Sample>& samples) {
+  for (auto& axis : axes_) axis.fresh = axis.fresh && std::abs(tag_ns - axis.tag_ns) <= together_ns_;
   const bool complete = std::all_of(axes_.begin(), axes_.end(), [](const Axis& axis) { return axis.fresh; });
-  if (!complete || newest->tag_ns - oldest->tag_ns > kTogetherNs || newest->tag_ns == last_imu_ns_) return;
-  last_imu_ns_ = newest->tag_ns;
+  if (!complete || tag_ns == last_imu_ns_) return;
+  last_imu_ns_ = tag_ns;
   dataset::ImuRow row;
-  row.stamp_ns = newest->tag_ns;
+  row.stamp_ns = tag_ns;
   for (size_t i = 0; i < 3; ++i) {
     row.rate_rps[i] = axes_[i].value;
     row.accel_mps2[i] = axes_[3 + i].value;
@@ -165,8 +215,11 @@ void UbxReadings::add_wheel(uint32_t data, const Count& count, std::vector<Sampl
 }
 
 std::string UbxReadings::why_silent() const {
-  if (!has_bytes_) return "sends nothing; check its power and the cable";
+  if (!has_bytes_)
+    return "sends nothing; check its power and the cable, and with `fuser` that no other program reads it";
   if (!has_frames_) return "sends what is no UBX; see that live.baud is the receiver's, and that UBX is switched on";
+  if (broken_in_a_row_ >= kBrokenLine)
+    return "sends only broken messages; check its cable, and that live.baud is the receiver's";
   if (!has_measurements_) return "sends no measurements; switch on its message UBX-ESF-MEAS (10 02)";
   return "sends no measurements any more, only other messages; switch it off and on";
 }

@@ -19,12 +19,14 @@ class UbxReadings {
   static constexpr int64_t kLeap = int64_t{1} << 40;
 
   /// Of the wheel; 0 where it is not used.
-  explicit UbxReadings(double pulses_per_metre) : pulses_per_metre_(pulses_per_metre) {}
+  explicit UbxReadings(double pulses_per_metre) : pulses_per_metre_(pulses_per_metre) { connected(); }
   /// What came before does not continue on this connection; the count of pulses does.
   void connected();
   /// With stamps in the receiver's time, IMU in its own axes. A wheel's pulses are counted over all connections.
   /// Arrival on the host's monotonic clock.
   [[nodiscard]] std::vector<Sample> read(std::span<const uint8_t> bytes, int64_t arrival_ns);
+  /// Since it was asked last. A frame whose beginning is broken, too, is not seen.
+  [[nodiscard]] Frames take_frames();
   /// Why there may be no samples, for a technician.
   [[nodiscard]] std::string why_silent() const;
 
@@ -52,7 +54,9 @@ class UbxReadings {
   };
   size_t read_frame(std::span<const uint8_t> bytes, int64_t arrival_ns, std::vector<Sample>& samples);
   void read_measurements(std::span<const uint8_t> payload, int64_t arrival_ns, std::vector<Sample>& samples);
-  void add_imu(std::vector<Sample>& samples);
+  size_t broken(size_t bytes);
+  void set_axis(Axis& axis, const Axis& now);
+  void add_imu(int64_t tag_ns, std::vector<Sample>& samples);
   [[nodiscard]] bool counted_on(const Count& count, uint32_t ticks) const;
   void add_wheel(uint32_t data, const Count& count, std::vector<Sample>& samples);
 
@@ -61,9 +65,12 @@ class UbxReadings {
   Tag imu_tag_;
   Tag wheel_tag_;
   std::array<Axis, 6> axes_;  // rates x, y, z in rad/s; accelerations x, y, z in m/s^2
+  int64_t together_ns_ = 0;   // tags of one sample are no further apart
   std::optional<int64_t> last_imu_ns_;
   std::optional<Count> last_count_;
   int64_t pulses_ = 0;
+  Frames frames_;
+  uint64_t broken_in_a_row_ = 0;
   bool has_bytes_ = false;
   bool has_frames_ = false;
   bool has_measurements_ = false;

@@ -33,7 +33,7 @@ class UbxReceiver final : public LiveSensor {
         "it; it is tried again"};
   }
 
-  core::Result<std::vector<Sample>> next(std::chrono::milliseconds patience) override {
+  core::Result<Delivery> next(std::chrono::milliseconds patience) override {
     const auto got = line_.read(bytes_, patience);
     if (!got.ok())
       return core::Error{name() + " was unplugged (" + got.error().message + "); check the cable, it is tried again"};
@@ -42,7 +42,7 @@ class UbxReceiver final : public LiveSensor {
     for (const auto& sample : readings_.read(std::span(bytes_).first(got.value()), arrival.monotonic_ns)) {
       if (wanted(sample)) samples.push_back(in_train(sample, arrival));
     }
-    return samples;
+    return Delivery{std::move(samples), readings_.take_frames(), ""};
   }
 
   void disconnect() override { line_.close(); }

@@ -72,6 +72,20 @@ TEST_F(LiveCamera, AGigeCameraThatComesGoesAndComesBack) {
   expect_growing_stamps();
 }
 
+// As with a wrong MTU: of every picture packets are missing.
+TEST_F(LiveCamera, PicturesThatComeIncompleteAreCountedAndNamed) {
+  if (!std::filesystem::exists(kFakeCamera)) GTEST_SKIP() << "aravis-tools are not installed";
+  const OnlyOne only_one;
+  const test::Program camera({kFakeCamera, "-i", "127.0.0.1", "-r", "300"});
+  const auto service = grabber("genicam:127.0.0.1", {"frame_grabber.fps=20", "frame_grabber.live.silent_s=1",
+                                                     "frame_grabber.live.reconnect_s=0.2"});
+  ASSERT_TRUE(run_until([&] {
+    return reason().find("sends only incomplete pictures (") != std::string::npos && status_.dropped() > 5;
+  })) << reason()
+      << status_.dropped();
+  EXPECT_THAT(reason(), HasSubstr("check live.packet_size against the network card's MTU"));
+}
+
 TEST_F(LiveCamera, AGstreamerPipeline) {
   const auto service = grabber(
       "capture:videotestsrc is-live=true pattern=snow ! video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1 ! "

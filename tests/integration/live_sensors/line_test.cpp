@@ -19,8 +19,14 @@ constexpr int64_t kPeriodMs = 10;
 /// time began at `origin_ns`.
 class Receiver {
  public:
+  struct Faults {
+    int64_t breaks = 0;          // of so many messages of the IMU one has a bit that is wrong; 0 = of none
+    int64_t wheel_after_ms = 0;  // the wheel begins to speak so long behind the IMU
+  };
   Receiver(const std::filesystem::path& name, int64_t origin_ns, bool has_wheel = true)
-      : line_(name), origin_ns_(origin_ns), has_wheel_(has_wheel), thread_([this] { run(); }) {}
+      : Receiver(name, origin_ns, has_wheel, Faults{}) {}
+  Receiver(const std::filesystem::path& name, int64_t origin_ns, bool has_wheel, Faults faults)
+      : line_(name), origin_ns_(origin_ns), has_wheel_(has_wheel), faults_(faults), thread_([this] { run(); }) {}
   ~Receiver() {
     stop_ = true;
     thread_.join();
@@ -31,13 +37,16 @@ class Receiver {
  private:
   void run() {
     int64_t tag_ms = (core::wall_ns() - origin_ns_) / 1'000'000 / kPeriodMs * kPeriodMs;
+    const int64_t wheel_from_ms = tag_ms + faults_.wheel_after_ms;
     while (!stop_) {
       tag_ms += kPeriodMs;
       const int64_t due_ns = origin_ns_ + tag_ms * 1'000'000;
       std::this_thread::sleep_for(std::chrono::nanoseconds(due_ns - core::wall_ns()));  // its rate
       const auto tag = static_cast<uint32_t>(tag_ms);
-      line_.write(test::ubx_measurements(tag, test::ubx_imu({0, 0, 4096}, {0, -1024, 10042})));
-      if (has_wheel_) {
+      std::string imu = test::ubx_measurements(tag, test::ubx_imu({0, 0, 4096}, {0, -1024, 10042}));
+      if (faults_.breaks > 0 && tag_ms / kPeriodMs % faults_.breaks == 0) imu[20] = static_cast<char>(imu[20] ^ 4);
+      line_.write(imu);
+      if (has_wheel_ && tag_ms >= wheel_from_ms) {
         const auto ticks = static_cast<uint32_t>(tag_ms / kPeriodMs * 3);
         line_.write(test::ubx_measurements(tag, {test::ubx_ticks(0x7FFFFF - 600 + ticks, false)}));
       }
@@ -46,6 +55,7 @@ class Receiver {
   test::PseudoTerminal line_;
   int64_t origin_ns_;
   bool has_wheel_;
+  Faults faults_;
   std::atomic<bool> stop_ = false;
   std::thread thread_;
 };
@@ -137,13 +147,37 @@ TEST_F(Line, AnImuThatSitsOtherwiseIsNotUsedAndTheWheelGoesOn) {
   const size_t wheel = wheel_.size();
   ASSERT_TRUE(run_until([&] { return wheel_.size() > wheel + 50; }));
   EXPECT_LE(imu_.size(), imu + 5) << "what was on its way";
+  EXPECT_TRUE(imu_.empty()) << "none is sent before it is judged";
 }
 
 TEST_F(Line, AWheelThatIsMissingIsSaid) {
   const auto service = both();
   const Receiver receiver(device(), core::wall_ns(), false);
   ASSERT_TRUE(told("no wheel pulses from ubx:" + device())) << reason();
-  EXPECT_GT(imu_.size(), 10U);
+  EXPECT_TRUE(run_until([this] { return imu_.size() > 10; })) << "the IMU goes on";
+}
+
+// The first sample behind it is that of one of its sensors; the other has been silent for as long as the line was.
+TEST_F(Line, AnOutageOfTheWholeLineIsNoneOfItsWheel) {
+  const auto service = both();
+  ASSERT_TRUE(told("cannot be opened")) << reason();
+  const int64_t out_ns = core::monotonic_ns();
+  ASSERT_TRUE(run_until([&] { return core::monotonic_ns() - out_ns > 2 * core::kNsPerSecond; }));
+  const Receiver receiver(device(), core::wall_ns(), true, {.breaks = 0, .wheel_after_ms = 500});
+  bool accused = false;
+  ASSERT_TRUE(run_until([&] {
+    accused = accused || reason().find("no wheel pulses") != std::string::npos;
+    return status_.state() == msg::STATE_ACTIVE;
+  })) << reason();
+  EXPECT_FALSE(accused);
+}
+
+TEST_F(Line, BrokenMessagesAreCountedAndSaid) {
+  const auto service = both();
+  const Receiver receiver(device(), core::wall_ns(), true, {.breaks = 10, .wheel_after_ms = 0});
+  ASSERT_TRUE(told("sends broken messages (")) << reason();
+  EXPECT_THAT(reason(), AllOf(HasSubstr("receiver ubx:" + device()), HasSubstr("check its cable")));
+  EXPECT_TRUE(run_until([this] { return status_.dropped() >= 10 && imu_.size() > 50; })) << status_.dropped();
 }
 
 TEST_F(Line, ThatIsSilentOrSpeaksSomethingElseIsSaidAndDoesNotHoldUpTheEnd) {

@@ -1,6 +1,8 @@
 // frame_grabber and sensor_gateway as programs, over DDS, with this test as the third in lock step.
 #include <gmock/gmock.h>
 
+#include <cstdlib>
+#include <fstream>
 #include <map>
 
 #include "core/time.hpp"
@@ -246,6 +248,70 @@ TEST_F(Playback, WhoIsStartedAnewAndTheOtherPlayTheSameTime) {
       << "the sensors go on at another time than the pictures";
   EXPECT_EQ(*std::next(goes_back(imu_, std::identity())), kBeginNs);
   EXPECT_LT(std::abs(imu_.back() - frames_.back().stamp_ns), kSecondNs);
+}
+
+/// A wall clock that the test sets for the programs that it starts meanwhile.
+class SetClock {
+ public:
+  explicit SetClock(std::filesystem::path file) : file_(std::move(file)) {
+    set_s(0);
+    setenv("LD_PRELOAD", (std::filesystem::path(RAILFIX_BIN_DIR) / "railfix-clock-step.so").c_str(), 1);
+    setenv("RAILFIX_CLOCK_STEP", file_.c_str(), 1);
+  }
+  ~SetClock() { unsetenv("LD_PRELOAD"); }
+  SetClock(const SetClock&) = delete;
+  SetClock& operator=(const SetClock&) = delete;
+  void set_s(int64_t seconds) const {
+    const int64_t ns = seconds * core::kNsPerSecond;
+    std::fstream file(file_, std::ios::binary | std::ios::in | std::ios::out | std::ios::ate);
+    if (!file) file.open(file_, std::ios::binary | std::ios::out);
+    file.seekp(0);
+    file.write(reinterpret_cast<const char*>(&ns), sizeof ns);
+  }
+
+ private:
+  std::filesystem::path file_;
+};
+
+// 20 s of ride, of which a clock that is followed would leave out or wait for 15.
+TEST_F(Playback, AWallClockThatIsSetMovesNothing) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the sanitizer wants to be loaded before everything else";
+#endif
+  constexpr int64_t kSecondNs = core::kNsPerSecond;
+  write_ride(25 * kPictureNs);
+  const SetClock clock(root_ / "step");
+  const auto sensors = gateway(false);
+  const auto pictures = grabber({"frame_grabber.pace=real", "frame_grabber.start=immediately"});
+  const int64_t begin_ns = core::monotonic_ns();
+  const auto comes_to = [&](int64_t data_s) {
+    return run_until([&] { return !imu_.empty() && imu_.back() > kBeginNs + data_s * kSecondNs; }) &&
+           run_until([&] { return frames_.back().stamp_ns > kBeginNs + data_s * kSecondNs; });
+  };
+  ASSERT_TRUE(comes_to(2));
+  for (const auto& [set_s, data_s] : std::map<int, int>{{-15, 5}, {15, 8}}) {
+    clock.set_s(set_s);
+    ASSERT_TRUE(comes_to(data_s));
+    EXPECT_LT(clocks_.back().data_ns(), kBeginNs + (data_s + 2) * kSecondNs);
+    EXPECT_LT(imu_.back(), kBeginNs + (data_s + 2) * kSecondNs) << "sensors go with the pictures";
+    const int64_t ahead_ns = clocks_.back().wall_ns() - core::wall_ns();
+    EXPECT_NEAR(core::seconds(ahead_ns), set_s, 1.5) << "who plays along hears what the clock says now";
+  }
+  const double took_s = core::seconds(core::monotonic_ns() - begin_ns);
+  EXPECT_GT(took_s, 7.5);
+  EXPECT_LT(took_s, 16);
+}
+
+TEST_F(Playback, WithAClockOfItsOwnTheGatewaySaysWhenThereIsNothingToPlay) {
+  std::filesystem::remove_all(root_ / "mav0/imu0");
+  std::filesystem::remove_all(root_ / "mav0/wheel0");
+  const auto outcome = test::run_program(
+      test::with_settings("railfix-sensor-gateway",
+                          {"common.domain=" + std::to_string(kDomain), "sensor_gateway.source=" + root_.string(),
+                           "sensor_gateway.clock=own", "sensor_gateway.start=immediately"}),
+      10);
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("has no IMU, wheel or GNSS samples to play; give a dataset folder"));
 }
 
 TEST_F(Playback, WhatCannotBePlayedIsExitCodeTwo) {

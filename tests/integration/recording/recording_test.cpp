@@ -170,6 +170,21 @@ TEST_F(RecordingTest, WhatIsReplayedIsRecordedAgain) {
   EXPECT_LT(p50_ms, 1.0);
 }
 
+TEST_F(RecordingTest, AFileThatCannotBeClosedIsExitCodeOne) {
+  const auto recording = folder_ / "ride.mcap";
+  const fs::path train = folder_ / "nowhere.yaml";
+  test::Program program(
+      recorder({"--set", "recorder.file=" + recording.string(), "--set", "recorder.train_file=" + train.string()}),
+      log());
+  wait_for_recorder();
+  fs::create_directories(recording / "in its place");
+  EXPECT_EQ(program.end(SIGTERM), 1);
+  const std::string said = test::slurp(folder_ / "recorder.log");
+  EXPECT_THAT(said, HasSubstr("ride.mcap.active: cannot be renamed to "));
+  EXPECT_THAT(said, HasSubstr("the recording could not be closed: see the error before"));
+  EXPECT_THAT(said, HasSubstr(train.string() + " cannot be read, so recordings will not say which it was"));
+}
+
 TEST_F(RecordingTest, AKilledRecorderLosesNoWrittenChunk) {
   const fs::path records = folder_ / "killed";
   const std::vector<std::string> settings{"--set", "recorder.folder=" + records.string(), "--set",

@@ -4,14 +4,15 @@
 
 #include <deque>
 #include <future>
+#include <utility>
 
 namespace railfix::frame_grabber {
 namespace {
 
 using ::testing::ElementsAre;
 
-/// Does what its script says: '+' picture, '!' gone, '-' cannot be connected (ends a connection attempt); at its end
-/// the promise is kept and nothing more comes.
+/// Does what its script says: '+' picture, 'x' one that is not whole, '!' gone, '-' cannot be connected (ends a
+/// connection attempt); at its end the promise is kept and nothing more comes.
 class Scripted : public LiveCamera {
  public:
   Scripted(std::string script, std::promise<void>& end) : script_(std::move(script)), end_(end) {}
@@ -28,9 +29,13 @@ class Scripted : public LiveCamera {
       ended_ = true;
       return std::optional<RawPicture>();
     }
-    if (script_[position_++] == '!') return core::Error{"unplugged"};
-    return std::optional(RawPicture{});
+    const char now = script_[position_++];
+    if (now == '!') return core::Error{"unplugged"};
+    if (now == '+') return std::optional(RawPicture{});
+    ++lost_;
+    return std::optional<RawPicture>();
   }
+  uint64_t take_lost() override { return std::exchange(lost_, 0); }
   void disconnect() override {}
   [[nodiscard]] std::string name() const override { return "camera scripted"; }
 
@@ -38,6 +43,7 @@ class Scripted : public LiveCamera {
   std::string script_;
   std::promise<void>& end_;
   size_t position_ = 0;
+  uint64_t lost_ = 0;
   bool ended_ = false;
 };
 
@@ -56,6 +62,7 @@ std::vector<std::string> run(const std::string& script, bool finish_pictures) {
     told.push_back("picture, lost " + std::to_string(picture.lost));
     if (finish_pictures) feed_made.get()->finished();
   };
+  events.lost = [&told](uint64_t pictures) { told.push_back("lost " + std::to_string(pictures)); };
   LiveFeed feed(std::make_unique<Scripted>(script, end), config, events);
   made.set_value(&feed);
   end.get_future().wait();
@@ -65,6 +72,10 @@ std::vector<std::string> run(const std::string& script, bool finish_pictures) {
 TEST(LiveFeed, ConnectsAgainAndTellsEachReasonOnce) {
   EXPECT_THAT(run("--+!-+", true), ElementsAre("not there", "there", "picture, lost 0", "unplugged", "not there",
                                                "there", "picture, lost 0"));
+}
+
+TEST(LiveFeed, TellsOfLostPicturesAlsoWhenNoneComes) {
+  EXPECT_THAT(run("+xx!", true), ElementsAre("there", "picture, lost 0", "lost 1", "lost 1", "unplugged", "there"));
 }
 
 /// Waits for its device for ever, until it is cancelled.

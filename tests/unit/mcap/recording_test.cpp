@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <csignal>
+#include <fstream>
 
 #include "mcap/check.hpp"
 #include "recordings.hpp"
@@ -209,6 +212,62 @@ TEST_F(RecordingTest, FullDiskIsAnErrorNotACrash) {
   const auto created = Writer::create(folder_ / "full.mcap", options);
   ASSERT_FALSE(created.ok());
   EXPECT_THAT(created.error().message, HasSubstr("disk full"));
+}
+
+/// A disk that is full where this file has so many bytes.
+class FullAt {
+ public:
+  explicit FullAt(uint64_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit now{bytes, before_.rlim_max};
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    setrlimit(RLIMIT_FSIZE, &now);
+  }
+  ~FullAt() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    static_cast<void>(std::signal(SIGXFSZ, handler_));
+  }
+  FullAt(const FullAt&) = delete;
+  FullAt& operator=(const FullAt&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = nullptr;
+};
+
+TEST_F(RecordingTest, AMessageThatWaitsForAFullDiskIsNotCalledLost) {
+  WriterOptions options;
+  options.chunk_age_s = 1e-9;
+  auto writer = Writer::create(folder_ / "full.mcap", options).value();
+  const uint16_t channel = writer->add_channel(0, "log_record", "json", {}).value();
+  {
+    const FullAt here(writer->bytes_written());
+    for (uint32_t i = 0; i < 5; ++i) EXPECT_TRUE(writer->write({channel, i, i, i, bytes_of("{}")}).ok());
+    const auto ticked = writer->tick();
+    ASSERT_FALSE(ticked.ok());
+    EXPECT_THAT(ticked.error().message, HasSubstr("is the disk full?"));
+  }
+  EXPECT_TRUE(writer->tick().ok());
+  ASSERT_TRUE(writer->close().ok());
+  EXPECT_EQ(read(*Reader::open(folder_ / "full.mcap").value()).size(), 5U);
+}
+
+TEST_F(RecordingTest, AMessageThatFindsNoRoomIsAnError) {
+  WriterOptions options;
+  options.chunk_bytes = 100;
+  auto writer = Writer::create(folder_ / "full.mcap", options).value();
+  const uint16_t channel = writer->add_channel(0, "log_record", "json", {}).value();
+  const FullAt here(writer->bytes_written());
+  EXPECT_TRUE(writer->write({channel, 0, 0, 0, bytes_of(std::string(60, '{'))}).ok());
+  EXPECT_FALSE(writer->write({channel, 1, 1, 1, bytes_of(std::string(60, '{'))}).ok()) << "memory has an end, too";
+}
+
+TEST_F(RecordingTest, KnowsWhenItsFileWasRemoved) {
+  auto writer = Writer::create(folder_ / "gone.mcap", {}).value();
+  std::filesystem::rename(folder_ / "gone.mcap.active", folder_ / "moved");
+  EXPECT_FALSE(writer->is_removed()) << "it is only moved";
+  std::filesystem::remove(folder_ / "moved");
+  EXPECT_TRUE(writer->is_removed());
 }
 
 TEST_F(RecordingTest, WhatOtherWritersLeaveOutOfTheSummaryIsFoundInTheFile) {

@@ -108,6 +108,16 @@ TEST(EventRule, ComparesNumbersTextsAndBits) {
   EXPECT_TRUE(rule("camera_preview.health != 0").concerns("camera_preview/rear"));
 }
 
+// Of one service there may be no milder line between two errors, and they are not the same.
+TEST(EventRule, EachLineOfALogIsAnEventOfItsOwn) {
+  EventRule error = rule("log_record.level >= error");
+  msg::LogRecord record;
+  record.level(4);
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(error.begins(sample(messaging::topics::log_record, record)));
+  record.level(2);
+  EXPECT_FALSE(error.begins(sample(messaging::topics::log_record, record)));
+}
+
 TEST(EventRule, LooksIntoArrays) {
   msg::PositionFix fix;
   fix.alternative_probability()[2] = 0.4;

@@ -184,6 +184,7 @@ TEST_F(RecorderEventsTest, WithoutARingAnEventProtectsTheRecording) {
   ASSERT_TRUE(file.ok());
   const auto marked = recorder->event("a jolt");
   ASSERT_TRUE(marked.ok()) << marked.error().message;
+  EXPECT_EQ(marked.value(), "marked in " + file.value() + ", which is protected now");
   EXPECT_TRUE(is_protected(file.value()));
   ASSERT_TRUE(recorder->stop().ok());
   EXPECT_EQ(mcap::Reader::open(file.value()).value()->metadata().back().entries.at("text"), "a jolt");

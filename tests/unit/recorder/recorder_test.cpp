@@ -189,14 +189,115 @@ TEST_F(RecorderTest, WhatWasSaidBeforeItListenedIsNotLost) {
   EXPECT_EQ(recorder->state().losses, "");
 }
 
-TEST_F(RecorderTest, FullDiskEndsTheRecordingProperly) {
+// A service says why it cannot start before anybody has found it.
+TEST_F(RecorderTest, LinesOfTheLogFromBeforeItListenedAreRecordedAndNoEvent) {
+  config_.events = {"log_record.level >= error"};
+  messaging::Writer<msg::LogRecord> log(participant_, topics::log_record);
+  const auto say = [&](const std::string& text) {
+    msg::LogRecord record;
+    record.level(4);
+    record.text(text);
+    ASSERT_TRUE(log.write(record));
+  };
+  say("cannot be opened");
+  say("gives up");
+  auto recorder = this->recorder();
+  const auto started = recorder->start("");
+  ASSERT_TRUE(started.ok());
+  ASSERT_TRUE(wait_until([&] { return recorder->state().written == 2; })) << recorder->state().written;
+  EXPECT_FALSE(recorder->state().event) << "it happened long ago";
+  say("now");
+  ASSERT_TRUE(wait_until([&] { return recorder->state().event.has_value(); }));
+  ASSERT_TRUE(recorder->stop().ok());
+  std::vector<std::string> texts;
+  auto reader = mcap::Reader::open(started.value()).value();
+  reader->for_each({{"log_record"}, {}, {}}, [&](const mcap::Channel& channel, const mcap::Message& message) {
+    EXPECT_EQ(channel.metadata.at("transient_local"), "false") << "no line stands for what lasts";
+    EXPECT_LE(message.publish_time_ns, message.log_time_ns);
+    msg::LogRecord record;
+    EXPECT_TRUE(messaging::deserialize({message.data.begin(), message.data.end()}, record));
+    texts.emplace_back(record.text().c_str());
+    return true;
+  });
+  EXPECT_THAT(texts, ::testing::ElementsAre("cannot be opened", "gives up", "now"));
+}
+
+TEST_F(RecorderTest, AFileThatIsRemovedIsSaidAndItGoesOnInANewFile) {
+  messaging::Writer<msg::CameraCalibration> calibration(participant_, topics::camera_calibration);
+  ASSERT_TRUE(calibration.write({}));
+  auto recorder = this->recorder();
+  const auto started = recorder->start((folder_ / "ride.mcap").string());
+  ASSERT_TRUE(started.ok());
+  ASSERT_TRUE(wait_until([&] { return recorder->state().written == 1; }));
+  fs::remove_all(folder_);
+  ASSERT_TRUE(wait_until([&] { return recorder->state().recording && recorder->state().file != started.value(); }))
+      << recorder->state().problem;
+  std::string said;
+  for (const auto& news : recorder->take_state().news) said += news.sentence + "\n";
+  EXPECT_THAT(said, HasSubstr("ride.mcap.active was removed while it was being recorded"));
+  EXPECT_THAT(said, HasSubstr("recording goes on in " + recorder->state().file));
+  ASSERT_TRUE(wait_until([&] { return recorder->state().messages == 1; })) << "standing values are in it";
+  EXPECT_TRUE(recorder->stop().ok());
+}
+
+// The command comes before, while and after the thread leaves the file by itself.
+TEST_F(RecorderTest, ACommandWaitsForWhatTheThreadDoesByItself) {
+  auto recorder = this->recorder();
+  for (int i = 0; i < 12; ++i) {
+    const auto started = recorder->start("");
+    ASSERT_TRUE(started.ok()) << started.error().message;
+    fs::remove(started.value() + kActive);
+    ::usleep(static_cast<useconds_t>(i) * 25'000);
+    (void)recorder->stop();
+    ASSERT_TRUE(wait_until([&] { return !recorder->state().recording || recorder->stop().ok(); }));
+    EXPECT_EQ(recorder->state().failure, "");
+  }
+}
+
+TEST_F(RecorderTest, WhatACrashLeftOfTheConfiguredFileIsPutAside) {
+  config_.file = (folder_ / "run.mcap").string();
+  fs::create_directories(folder_);
+  for (const char* aside : {"run-cut-off.mcap.active", "run-cut-off-2.mcap.active"}) {
+    std::ofstream(folder_ / "run.mcap.active") << aside;
+    auto recorder = this->recorder();
+    ASSERT_TRUE(recorder->start("").ok());
+    const auto news = recorder->take_state().news;
+    ASSERT_EQ(news.size(), 1U);
+    EXPECT_THAT(news[0].sentence, HasSubstr("run.mcap.active was left by a crash and is now "));
+    std::string kept;
+    std::ifstream(folder_ / aside) >> kept;
+    EXPECT_EQ(kept, aside);
+    ASSERT_TRUE(recorder->stop().ok());
+  }
+  EXPECT_TRUE(mcap::Reader::open(config_.file).value()->indexed());
+}
+
+TEST_F(RecorderTest, ABareNameIsOneInTheFolder) {
+  auto recorder = this->recorder();
+  EXPECT_EQ(recorder->start("ride1").value(), folder_ / "ride1.mcap");
+  EXPECT_TRUE(recorder->housekeeper().protect("ride1", "by hand").ok());
+  ASSERT_TRUE(recorder->stop().ok());
+  EXPECT_EQ(recorder->start("ride2.mcap").value(), folder_ / "ride2.mcap");
+}
+
+TEST_F(RecorderTest, AFullDiskIsRefusedAndLeavesNoFile) {
   config_.keep_free_mb = 1e12;
   auto recorder = this->recorder();
   const auto started = recorder->start((folder_ / "full.mcap").string());
-  ASSERT_TRUE(started.ok());
-  ASSERT_TRUE(wait_until([&] { return !recorder->state().recording; }));
-  EXPECT_THAT(recorder->state().problem, HasSubstr("MB free"));
-  EXPECT_TRUE(mcap::Reader::open(folder_ / "full.mcap").value()->indexed());
+  ASSERT_FALSE(started.ok());
+  EXPECT_THAT(started.error().message, HasSubstr("MB free; goes on in a new file when "));
+  EXPECT_TRUE(recorder->state().goes_on_by_itself);
+  EXPECT_FALSE(recorder->state().recording);
+  EXPECT_FALSE(fs::exists(folder_));
+  EXPECT_TRUE(recorder->stop().ok()) << "does not wait any more";
+  EXPECT_FALSE(recorder->state().goes_on_by_itself);
+}
+
+TEST_F(RecorderTest, ATopicToLeaveOutThatThereIsNotIsRefused) {
+  config_.leave_out = {"camera_frame/cam0", "log_record"};
+  EXPECT_NO_THROW((void)recorder());
+  config_.leave_out = {"log_recrod"};
+  EXPECT_THROW((void)recorder(), core::BadInput);
 }
 
 // On a small disk of its own.
@@ -206,9 +307,11 @@ TEST_F(RecorderTest, GoesOnByItselfWhenThereIsRoomAgain) {
   config_.keep_free_mb = 5;
   {
     auto recorder = this->recorder();
-    ASSERT_TRUE(recorder->start("").ok());
+    const auto started = recorder->start("");
+    ASSERT_TRUE(started.ok());
     std::ofstream(folder_ / "filler") << std::string(17'000'000, ' ');
     EXPECT_TRUE(wait_until([&] { return !recorder->state().recording; }));
+    EXPECT_TRUE(mcap::Reader::open(started.value()).value()->indexed()) << "it is closed properly";
     EXPECT_THAT(recorder->state().problem, HasSubstr("goes on in a new file when 10 MB are free"));
     fs::remove(folder_ / "filler");
     EXPECT_TRUE(wait_until([&] { return recorder->state().recording; }));

@@ -250,6 +250,16 @@ TEST_F(RecordingsFolder, SurveyCountsWhatIsThere) {
   EXPECT_TRUE(std::isnan(status_of({}, survey(folder_ / "nowhere"), 0).disk_free_mb()));
 }
 
+TEST_F(RecordingsFolder, OnlyFilesOfEventsCountAsSuch) {
+  make("re-event-1-20231114-221320.mcap", 5);
+  EXPECT_EQ(survey(folder_).event_bytes, 0U) << "a train's name";
+  make("re-event-1-20231114-221320-event.mcap", 5);
+  const uint64_t one = survey(folder_).event_bytes;
+  EXPECT_GT(one, 0U);
+  make("t-20231114-221320-2-event-recovered.mcap", 5);
+  EXPECT_GT(survey(folder_).event_bytes, one);
+}
+
 TEST_F(RecordingsFolder, RecordingsAreFoundByWhatPeopleCallThem) {
   make("a.mcap", 1);
   make("b.mcap.active", 1);

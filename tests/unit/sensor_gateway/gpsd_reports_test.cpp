@@ -74,6 +74,27 @@ TEST_F(GpsdReportsTest, WhatSatellitesDidNotMeasureIsNoPosition) {
   EXPECT_TRUE(std::isnan(none[0].row.lat_deg) && std::isnan(none[0].row.hdop));
 }
 
+// A receiver with sensors, whose place IMU and wheel are in already.
+TEST_F(GpsdReportsTest, APlaceWithDeadReckoningInItIsNoneAndSaysWhatToSwitchOff) {
+  say(tpv("00:00.000", R"("mode":1)"));
+  say(sky("1"));
+  seconds_ = 1;
+  EXPECT_EQ(fix_of(R"("mode":3,"status":6)"), 0);
+  EXPECT_THAT(reports_.complaint(), AllOf(HasSubstr("status 6"), HasSubstr("switch the receiver's sensor fusion off")));
+  EXPECT_EQ(fix_of(R"("mode":3,"status":1)"), 1);
+  EXPECT_THAT(reports_.complaint(), IsEmpty());
+}
+
+TEST_F(GpsdReportsTest, APlaceWithoutItsTimeIsSaid) {
+  say(kOne);
+  say(tpv("00:00.000", R"("mode":1)"));
+  say(sky("1"));
+  EXPECT_THAT(say(R"({"class":"TPV","device":"/dev/ttyACM0","mode":3,"lat":46.9,"lon":7.4})"), IsEmpty());
+  EXPECT_THAT(reports_.why_silent(), AllOf(HasSubstr("without their time and date"), HasSubstr("RMC or ZDA")));
+  EXPECT_EQ(say(tpv("00:01.000", R"("mode":3)")).size(), 1U);
+  EXPECT_THAT(reports_.why_silent(), HasSubstr("its cable"));
+}
+
 TEST_F(GpsdReportsTest, EachEpochOnceAndNoOldOnes) {
   say(tpv("00:00.000", R"("mode":1)"));
   say(sky("1"));

@@ -43,6 +43,28 @@ TEST(GravityWatch, OtherUnitsAreTold) {
   EXPECT_THAT(recorded.trouble_of_recording(), HasSubstr("called up, the other way round; the recording's IMU must"));
 }
 
+TEST(GravityWatch, ItIsKnownToBeRightAfterASecond) {
+  GravityWatch watch;
+  static_cast<void>(after(watch, 0, 0.9, 0, 0, 9.81));
+  EXPECT_FALSE(watch.agrees());
+  static_cast<void>(after(watch, 0.9, 0.2, 0, 0, 9.81));
+  EXPECT_TRUE(watch.agrees());
+  static_cast<void>(after(watch, 10, 0.5, 0, 0, 9.81));
+  EXPECT_FALSE(watch.agrees()) << "behind a gap it may be another one";
+  static_cast<void>(after(watch, 10.5, 1, 0, 0, 9.81));
+  EXPECT_TRUE(watch.agrees());
+
+  for (const double gravity_mps2 : {9.81, -9.81, 1.0}) {
+    GravityWatch wrong;
+    EXPECT_THAT(after(wrong, 0, 9, 0.1, gravity_mps2, 0.1), IsEmpty());
+    EXPECT_FALSE(wrong.agrees()) << gravity_mps2;
+  }
+  GravityWatch shaken;
+  static_cast<void>(after(shaken, 0, 0.1, 30, 0, 0));
+  static_cast<void>(after(shaken, 0.1, 2, 0, 0, 9.81));
+  EXPECT_TRUE(shaken.agrees()) << "where it is met first is no matter";
+}
+
 TEST(GravityWatch, NothingIsSaidBeforeTenSecondsAndAShockIsNone) {
   GravityWatch watch;
   EXPECT_THAT(after(watch, 0, 9, 9.81, 0, 0), IsEmpty());

@@ -9,8 +9,8 @@ namespace {
 
 using ::testing::ElementsAre;
 
-/// Does what its script says: '+' sample, '!' gone, '-' cannot be connected; at its end the promise is kept and nothing
-/// more comes until it is cancelled.
+/// Does what its script says: '+' sample, 'x' a broken message, '!' gone, '-' cannot be connected; at its end the
+/// promise is kept and nothing more comes until it is cancelled.
 class Scripted : public LiveSensor {
  public:
   Scripted(std::string script, std::promise<void>& end) : script_(std::move(script)), end_(end) {}
@@ -21,15 +21,15 @@ class Scripted : public LiveSensor {
     }
     return std::string("there");
   }
-  core::Result<std::vector<Sample>> next(std::chrono::milliseconds) override {
+  core::Result<Delivery> next(std::chrono::milliseconds) override {
     if (position_ == script_.size()) {
       if (!ended_) end_.set_value();
       ended_ = true;
       cancelled_.get_future().wait();
-      return std::vector<Sample>();
+      return Delivery();
     }
     if (script_[position_++] == '!') return core::Error{"unplugged"};
-    return std::vector<Sample>{dataset::WheelRow()};
+    return script_[position_ - 1] == 'x' ? Delivery{{}, {0, 1}, ""} : Delivery{{dataset::WheelRow()}, {1, 0}, ""};
   }
   void disconnect() override {}
   void cancel() override { cancelled_.set_value(); }
@@ -53,7 +53,9 @@ std::vector<std::string> run(const std::string& script) {
   FeedEvents events;
   events.connected = [&told](const std::string& what) { told.push_back(what); };
   events.gone = [&told](const std::string& why) { told.push_back(why); };
-  events.samples = [&told](const std::vector<Sample>&) { told.emplace_back("sample"); };
+  events.delivered = [&told](const Delivery& delivery) {
+    told.emplace_back(delivery.frames.broken > 0 ? "broken" : "sample");
+  };
   {
     const SensorFeed feed(std::make_unique<Scripted>(script, end), config, events);
     end.get_future().wait();
@@ -66,6 +68,10 @@ TEST(SensorFeed, ConnectsAgainAndTellsEachReasonOnce) {
   EXPECT_THAT(run("+!!!+"), ElementsAre("there", "sample", "unplugged", "there", "sample"));
 }
 
+TEST(SensorFeed, TellsOfWhatCameBroken) {
+  EXPECT_THAT(run("+xx!+"), ElementsAre("there", "sample", "broken", "broken", "unplugged", "there", "sample"));
+}
+
 /// Connected, and nothing ever comes.
 class Silent : public LiveSensor {
  public:
@@ -74,7 +80,7 @@ class Silent : public LiveSensor {
     if (++connections_ == 3) anew_.set_value();
     return std::string("there");
   }
-  core::Result<std::vector<Sample>> next(std::chrono::milliseconds) override { return std::vector<Sample>(); }
+  core::Result<Delivery> next(std::chrono::milliseconds) override { return Delivery(); }
   void disconnect() override {}
   void cancel() override {}
   [[nodiscard]] const std::string& source() const override { return source_; }

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <numbers>
 
 #include "core/time.hpp"
@@ -63,6 +64,39 @@ TEST_F(UbxReadingsTest, RatesAndAccelerationsInTwoMessages) {
   EXPECT_EQ(say(ubx_measurements(105, {{16, 4}, {17, 5}, {18, 6}})).size(), 1U);
   EXPECT_THAT(say(ubx_measurements(200, {{14, 1}, {13, 2}, {5, 3}})), IsEmpty());
   EXPECT_THAT(say(ubx_measurements(300, {{16, 4}, {17, 5}, {18, 6}})), IsEmpty()) << "they are not of one time";
+}
+
+// Each is the number of its tick, 100 a second.
+TEST_F(UbxReadingsTest, ALostMessageCostsItsSampleAndPairsNoOthers) {
+  std::vector<int64_t> ticks;
+  const auto hear = [&](const std::string& bytes) {
+    for (const auto& sample : say(bytes)) {
+      const auto& row = std::get<dataset::ImuRow>(sample);
+      const int64_t tick = std::lround(row.accel_mps2[0] * 1024);
+      ticks.push_back(tick);
+      EXPECT_EQ(std::lround(row.rate_rps[0] * 180 / std::numbers::pi * 4096), tick);
+      EXPECT_EQ(row.stamp_ns, tick * 10 * kMs);
+    }
+  };
+  for (int tick = 100; tick < 110; ++tick) {
+    const auto tag_ms = static_cast<uint32_t>(10 * tick);
+    if (tick != 103) hear(ubx_measurements(tag_ms, {{14, tick}, {13, 0}, {5, 0}}));
+    if (tick != 106) hear(ubx_measurements(tag_ms, {{16, tick}, {17, 0}, {18, 0}}));
+  }
+  EXPECT_THAT(ticks, ElementsAre(100, 101, 102, 104, 105, 107, 108, 109));
+}
+
+TEST_F(UbxReadingsTest, ALineThatIsJoinedBetweenTheTwoMessagesOfASampleFindsItsPairs) {
+  std::vector<int64_t> apart;
+  say(ubx_measurements(990, {{16, 99}, {17, 0}, {18, 0}}));
+  for (int tick = 100; tick < 110; ++tick) {
+    const auto tag_ms = static_cast<uint32_t>(10 * tick);
+    say(ubx_measurements(tag_ms, {{14, tick}, {13, 0}, {5, 0}}));
+    for (const auto& sample : say(ubx_measurements(tag_ms, {{16, tick}, {17, 0}, {18, 0}})))
+      apart.push_back(tick - std::lround(std::get<dataset::ImuRow>(sample).accel_mps2[0] * 1024));
+  }
+  ASSERT_GE(apart.size(), 8U);
+  EXPECT_THAT(apart, ::testing::Each(0));
 }
 
 TEST_F(UbxReadingsTest, AWheelForwardBackwardAndAroundItsCounter) {
@@ -133,6 +167,32 @@ TEST_F(UbxReadingsTest, GarbageCostsNoFrameThatIsWhole) {
   EXPECT_THAT(pulses, ElementsAre(0, 1, 2, 3));
 }
 
+TEST_F(UbxReadingsTest, BrokenFramesAreCounted) {
+  const std::string good = ubx_measurements(1, {ubx_ticks(1, false)});
+  std::string spoilt = good;
+  spoilt[10] = static_cast<char>(spoilt[10] ^ 1);
+  say(good + spoilt + good + spoilt.substr(0, 12) + good);
+  const Frames frames = readings_.take_frames();
+  EXPECT_EQ(frames.whole, 3U);
+  EXPECT_EQ(frames.broken, 2U);
+  EXPECT_EQ(readings_.take_frames().broken, 0U) << "told once";
+}
+
+// One whose length became longer is not waited for: the frames behind it come as they are said.
+TEST_F(UbxReadingsTest, AWrongLengthHoldsUpNoFrameBehindIt) {
+  for (const int flipped : {0x02, 0x0E, 0x40}) {
+    std::string longer = ubx_measurements(10, {ubx_ticks(10, false)});
+    longer[4] = static_cast<char>(longer[4] ^ flipped);
+    EXPECT_THAT(say(longer), IsEmpty());
+    EXPECT_EQ(say(ubx_measurements(20, {ubx_ticks(20, false)})).size(), 1U);
+    longer = test::ubx_frame(0x01, 0x07, std::string(92, '\0'));
+    longer[5] = static_cast<char>(longer[5] ^ 0x08);
+    EXPECT_THAT(say(longer), IsEmpty());
+    EXPECT_EQ(say(ubx_measurements(30, {ubx_ticks(30, false)})).size(), 1U);
+  }
+  EXPECT_EQ(readings_.take_frames().broken, 6U);
+}
+
 TEST_F(UbxReadingsTest, MessagesThatAreTooShortAreNone) {
   EXPECT_THAT(say(test::ubx_frame(0x10, 0x02, "")), IsEmpty());
   std::string payload = test::little_endian(5, 4) + test::little_endian(3U << 11U, 2) + test::little_endian(0, 2);
@@ -147,6 +207,11 @@ TEST_F(UbxReadingsTest, SaysWhyNothingComes) {
   EXPECT_THAT(readings_.why_silent(), HasSubstr("live.baud"));
   say(test::ubx_frame(0x01, 0x07, std::string(92, '\0')));
   EXPECT_THAT(readings_.why_silent(), HasSubstr("UBX-ESF-MEAS"));
+  say(ubx_measurements(1, {ubx_ticks(1, false)}));
+  std::string spoilt = ubx_measurements(2, {ubx_ticks(2, false)});
+  spoilt[10] = static_cast<char>(spoilt[10] ^ 1);
+  say(spoilt + spoilt + spoilt);
+  EXPECT_THAT(readings_.why_silent(), HasSubstr("only broken messages"));
 }
 
 TEST(ImuAxes, AreTurnedIntoThoseOfTheTrain) {
