@@ -25,7 +25,9 @@ struct FusionConfig {
         "start", start,
         "Where the train begins, EDGE:OFFSET[:+|-] (+ = the cab looks towards growing offsets), or unknown: then "
         "a network fix of map_matcher decides.");
-    fields.flag("use_camera", use_camera, "Use odometry_step.");
+    fields.flag("use_camera", use_camera,
+                "Use odometry_step; otherwise map_matcher, which believes no camera that fusion does not use, is led "
+                "by the gyro, too.");
     fields.flag("use_wheel", use_wheel, "Use wheel_sample.");
     fields.flag("use_imu", use_imu, "Use imu_sample.");
     fields.flag("use_gnss", use_gnss, "Use gnss_fix.");

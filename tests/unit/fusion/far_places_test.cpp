@@ -9,6 +9,7 @@ namespace railfix::fusion {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 /// 600 km in edges of 10 km, all drawn northwards.
 std::shared_ptr<const track::Map> long_line() {
@@ -159,6 +160,19 @@ TEST(FarPlaces, NorIsOneThatGnssContradictsFromBeyondTheEndOfItsWay) {
   }
   EXPECT_EQ(state.integrity, Integrity::unusable);
   EXPECT_THAT(state.reason, HasSubstr("GNSS contradicts the position"));
+}
+
+// Of a train that stops in front of the buffers.
+TEST(FarPlaces, ButNotOneThatItPutsSomeMetresFurtherBeyondTheEnd) {
+  auto fusion = fusion_at(19994);
+  fusion.add(fix_at(0.5, 19994, 1));
+  TrainEstimate state;
+  for (int t_s = 0; t_s < 20; ++t_s) {
+    state = run(fusion, t_s, t_s + 1, 0);
+    fusion.add(GnssInput{at(t_s + 1.001), 0, 20005, 1.0, 1});
+  }
+  EXPECT_LT(state.under_m, 6) << "it knows that it is not beyond the end";
+  EXPECT_THAT(state.reason, Not(HasSubstr("GNSS contradicts")));
 }
 
 }  // namespace

@@ -319,7 +319,7 @@ TEST_F(BuildTest, NodesThatAreMissingAreToldInOneSentence) {
                                    "the ways together with their nodes, from Overpass by (._;>;); or by out geom;"));
   const std::vector<std::string> told = problems(7);
   EXPECT_THAT(told.front(),
-              HasSubstr("way 5, way 6, way 7, way 8, way 9 and 2 more ways name 7 nodes that the data do not hold"));
+              HasSubstr("way 5, way 6, way 7, way 8, way 9 and 2 more name 7 nodes that the data do not hold"));
   EXPECT_EQ(std::ranges::count_if(told, [](const auto& one) { return one.find("do not hold") != one.npos; }), 1);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "core/units.hpp"
@@ -15,6 +16,7 @@ namespace railfix::track {
 namespace {
 
 constexpr size_t kMostStraysNamed = 5;
+constexpr double kApartM = 0.01;
 constexpr const char* kAskForNodes =
     "extract the ways together with their nodes, from Overpass by (._;>;); or by out geom;";
 
@@ -40,34 +42,15 @@ class Tracer {
 
  private:
   void collect_segments() {
-    std::set<std::pair<int64_t, int64_t>> seen;
     size_t missing = 0;
-    std::vector<int64_t> lacking;  // ways
+    std::vector<std::string> lacking;
     std::vector<std::string> shapeless;
     for (size_t way = 0; way < data_.ways.size(); ++way) {
-      const size_t missing_before = missing;
-      int64_t before = 0;
-      bool has_before = false;
-      bool has_length = false;
-      for (const int64_t node : data_.ways[way].nodes) {
-        if (!place(node)) {
-          ++missing;
-          has_before = false;
-          continue;
-        }
-        const bool are_apart = has_before && (places_.at(before) - places_.at(node)).norm() > 0.01;
-        has_length = has_length || are_apart;
-        if (are_apart && seen.insert(std::minmax(before, node)).second) {
-          at_node_[before].push_back(segments_.size());
-          at_node_[node].push_back(segments_.size());
-          segments_.push_back({before, node, way});
-        }
-        before = node;
-        has_before = true;
-      }
-      if (missing > missing_before) {
-        lacking.push_back(data_.ways[way].id);
-      } else if (!has_length) {
+      const auto of_way = collect_segments(way);
+      missing += of_way.missing;
+      if (of_way.missing > 0) {
+        lacking.push_back("way " + std::to_string(data_.ways[way].id));
+      } else if (!of_way.has_length) {
         shapeless.push_back("way " + std::to_string(data_.ways[way].id));
       }
     }
@@ -78,13 +61,34 @@ class Tracer {
     if (missing > 0) out_.cuts.push_back(told_missing(lacking, missing));
   }
 
+  struct WayNodes {
+    size_t missing = 0;  // nodes that the data do not hold
+    bool has_length = false;
+  };
+  WayNodes collect_segments(size_t way) {
+    WayNodes nodes;
+    std::optional<int64_t> before;
+    for (const int64_t node : data_.ways[way].nodes) {
+      if (!place(node)) {
+        ++nodes.missing;
+        before.reset();
+        continue;
+      }
+      const bool are_apart = before && (places_.at(*before) - places_.at(node)).norm() > kApartM;
+      nodes.has_length = nodes.has_length || are_apart;
+      if (are_apart && met_.insert(std::minmax(*before, node)).second) {
+        at_node_[*before].push_back(segments_.size());
+        at_node_[node].push_back(segments_.size());
+        segments_.push_back({*before, node, way});
+      }
+      before = node;
+    }
+    return nodes;
+  }
+
   /// One sentence for all: of a region that is cut out, every way over its border lacks nodes.
-  static std::string told_missing(const std::vector<int64_t>& ways, size_t nodes) {
-    std::string names;
-    const size_t named = std::min(kMostStraysNamed, ways.size());
-    for (size_t i = 0; i < named; ++i) names += (i == 0 ? "way " : ", way ") + std::to_string(ways[i]);
-    if (ways.size() > named) names += " and " + std::to_string(ways.size() - named) + " more ways";
-    return names + (ways.size() == 1 ? " names " : " name ") + std::to_string(nodes) +
+  static std::string told_missing(const std::vector<std::string>& ways, size_t nodes) {
+    return told_list(ways, kMostStraysNamed) + (ways.size() == 1 ? " names " : " name ") + std::to_string(nodes) +
            (nodes == 1 ? " node" : " nodes") +
            " that the data do not hold; the tracks have gaps there: " + kAskForNodes;
   }
@@ -171,6 +175,7 @@ class Tracer {
   const Projection& projection_;
   double smooth_m_;
   std::vector<Segment> segments_;
+  std::set<std::pair<int64_t, int64_t>> met_;  // nodes that a segment joins, once
   std::unordered_map<int64_t, std::vector<size_t>> at_node_;
   OsmPlaces places_;
   OsmChains out_;
