@@ -24,8 +24,7 @@ constexpr int kPicturesTried = 100;
 constexpr double kGuessedHeightM = 2.5;
 constexpr const char* kNoHostTime =
     "the camera's clock does not follow PTP (live.ptp), so pictures are stamped when they come; see that the camera "
-    "has "
-    "PTP and that a ptp4l of this host's time (UTC, not TAI) is the master on its network";
+    "has PTP and that a ptp4l of this host's time (UTC, not TAI) is the master on its network";
 constexpr std::chrono::milliseconds kWaitCheck{100};
 
 /// "pictures are covered: look for ..."

@@ -16,6 +16,7 @@ using core::Result;
 
 constexpr int kBuffers = 12;
 constexpr int64_t kExposurePeriodNs = core::kNsPerSecond;
+constexpr uint64_t kCutByChance = 2;    // pictures in a row; a cable that is pulled out cuts one, too
 constexpr uint64_t kLargestGap = 1000;  // pictures; more is a camera that began to count anew
 constexpr uint64_t kIds16 = 0xFFFF;     // 65535 is followed by 1
 
@@ -74,6 +75,8 @@ class GenicamCamera final : public LiveCamera {
   bool enable_ptp();
   core::Status start();
   void read_exposure();
+  void note_nothing_came();
+  void note_incomplete(ArvBuffer* buffer);
   RawPicture picture_of(ArvBuffer* buffer);
   int64_t mid_exposure_ns(ArvBuffer* buffer);
   [[nodiscard]] bool shows_host_time(ArvBuffer* buffer) const;
@@ -87,6 +90,7 @@ class GenicamCamera final : public LiveCamera {
   std::optional<uint64_t> last_id_;
   uint64_t lost_ = 0;        // pictures, not yet told
   uint64_t incomplete_ = 0;  // since the last whole one
+  int64_t came_ns_ = 0;      // the last picture, whole or not; monotonic
   float exposure_s_ = 0;
   int64_t exposure_read_ns_ = 0;
   bool has_ptp_ = false;
@@ -197,29 +201,47 @@ core::Status GenicamCamera::start() {
   return {};
 }
 
+// Where it cannot be read it is taken to be as it was: 0 would move every stamp by half of it.
 void GenicamCamera::read_exposure() {
-  const double exposure_us = arv_camera_get_exposure_time(camera_.get(), nullptr);
-  exposure_s_ = static_cast<float>(exposure_us > 0 ? exposure_us * 1e-6 : 0);
+  Said said;
+  const double exposure_us = arv_camera_get_exposure_time(camera_.get(), said);
   exposure_read_ns_ = core::monotonic_ns();
+  if (said.failed()) return;
+  exposure_s_ = static_cast<float>(exposure_us > 0 ? exposure_us * 1e-6 : 0);
 }
 
 Result<std::optional<RawPicture>> GenicamCamera::next(std::chrono::milliseconds patience) {
-  // An automatic one changes by a factor of ten where a tunnel begins.
-  if (config_.exposure_us <= 0 && core::monotonic_ns() - exposure_read_ns_ >= kExposurePeriodNs) read_exposure();
   const auto patience_us = std::chrono::duration_cast<std::chrono::microseconds>(patience).count();
   ArvBuffer* buffer = arv_stream_timeout_pop_buffer(stream_.get(), static_cast<uint64_t>(patience_us));
-  if (buffer == nullptr) return std::optional<RawPicture>();
+  if (buffer == nullptr) {
+    note_nothing_came();
+    return std::optional<RawPicture>();
+  }
+  came_ns_ = core::monotonic_ns();
   if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS) {
-    count_lost_before(arv_buffer_get_frame_id(buffer));
-    ++lost_;
-    ++incomplete_;
-    arv_stream_push_buffer(stream_.get(), buffer);
+    note_incomplete(buffer);
     return std::optional<RawPicture>();
   }
   incomplete_ = 0;
   RawPicture picture = picture_of(buffer);
   if (picture.bytes == nullptr) return Error{name() + " sends broken pictures; set pixel_format and packet_size anew"};
+  // An automatic one changes by a factor of ten where a tunnel begins. A camera that is away is not asked: it would be
+  // waited for. After the picture has its stamp, so that the answer's way delays none.
+  if (config_.exposure_us <= 0 && core::monotonic_ns() - exposure_read_ns_ >= kExposurePeriodNs) read_exposure();
   return std::optional<RawPicture>(std::move(picture));
+}
+
+// What was cut before is not why nothing comes at all. Half, as silence is told live.silent_s behind the last whole
+// one.
+void GenicamCamera::note_nothing_came() {
+  if (core::seconds(core::monotonic_ns() - came_ns_) > config_.silent_s / 2) incomplete_ = 0;
+}
+
+void GenicamCamera::note_incomplete(ArvBuffer* buffer) {
+  count_lost_before(arv_buffer_get_frame_id(buffer));
+  ++lost_;
+  ++incomplete_;
+  arv_stream_push_buffer(stream_.get(), buffer);
 }
 
 RawPicture GenicamCamera::picture_of(ArvBuffer* buffer) {
@@ -268,7 +290,7 @@ bool GenicamCamera::shows_host_time(ArvBuffer* buffer) const {
 }
 
 std::string GenicamCamera::why_silent() const {
-  if (incomplete_ == 0) return "";
+  if (incomplete_ <= kCutByChance) return "";
   return "sends only incomplete pictures (" + std::to_string(incomplete_) +
          "); check live.packet_size against the network card's MTU, and the cable";
 }

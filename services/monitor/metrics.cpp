@@ -143,12 +143,18 @@ void add_services(Families& families, const TrainSeen& seen) {
   }
 }
 
+// A train without a map lacks no track that an alert could ask for.
+double track_known(const TrainSeen& seen, const msg::TrainState& state) {
+  if (!seen.on_map()) return kNaN;
+  return state.track_known() != 0 ? 1 : 0;
+}
+
 void add_position(Families& families, const MetricsInput& input) {
   families.counter("railfix_position_reports_total", "Position reports since the monitor began.", input.reports);
   const auto& seen = *input.seen;
   if (seen.state || seen.awaited_s) {
     families.gauge("railfix_position_age_seconds",
-                   "Since the last train_state; before the first since fusion is there.",
+                   "Since the last train_state; before the first since fusion is there, or since the data began.",
                    seen.state ? seen.state_age_s : *seen.awaited_s);
   }
   if (!seen.state) return;
@@ -165,11 +171,9 @@ void add_position(Families& families, const MetricsInput& input) {
   gauge("railfix_position_under_meters", "The train may be this far before its estimate", state.under_m());
   gauge("railfix_position_since_reference_meters", "Travelled since the last landmark or fix",
         state.since_reference_m());
-  const bool on_map = seen.on_map();
-  gauge("railfix_position_track_known", "1: it is known which track the train is on; NaN without a map",
-        !on_map                    ? kNaN
-        : state.track_known() != 0 ? 1
-                                   : 0);
+  gauge("railfix_position_track_known",
+        "1: it is known which track the train is on; NaN where the monitor has no map and fusion names no place",
+        track_known(seen, state));
   gauge("railfix_position_track_probability", "That it is this track and no other", state.track_probability());
   gauge("railfix_position_integrity", "0 ok, 1 degraded, 2 unusable", state.integrity());
   gauge("railfix_train_speed_meters_per_second", "Signed, along the cab's forward axis", state.speed_mps());

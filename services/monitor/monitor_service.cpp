@@ -113,8 +113,10 @@ void MonitorService::start_timers() {
     written_ = context_.participant().written_topics();
     show_channels();
     choose_topics();
-    forget_stopped();
-    look_for_problems();
+    await_data();
+    const TrainSeen train = train_seen();
+    forget_stopped(train);
+    look_for_problems(train);
     publish_topics();
     publish_beat();
     give_up_waiting();
@@ -342,7 +344,7 @@ void MonitorService::look_for_silence() {
   if (recent(player_)) services_.note_player(player_.arrived_ns);
   if (!services_.note_silence(core::monotonic_ns())) return;
   publish_services();
-  look_for_problems();
+  look_for_problems(train_seen());
 }
 
 void MonitorService::publish_services() {
@@ -350,14 +352,18 @@ void MonitorService::publish_services() {
   for (const auto& message : first("services")) live_.publish("services", message);
 }
 
-void MonitorService::look_for_problems() {
+// From data that has not begun no position can come.
+void MonitorService::await_data() {
+  if (awaits_since_ns_ && waiting_source(services_) != nullptr) awaits_since_ns_ = core::monotonic_ns();
+}
+
+void MonitorService::look_for_problems(const TrainSeen& train) {
   looked_ = true;
-  if (!problems_.update(find_problems(train_seen()), core::monotonic_ns())) return;
+  if (!problems_.update(find_problems(train), core::monotonic_ns())) return;
   for (const auto& message : first("problems")) live_.publish("problems", message);
 }
 
-void MonitorService::forget_stopped() {
-  const auto train = train_seen();
+void MonitorService::forget_stopped(const TrainSeen& train) {
   services_.forget_stopped(train.now_ns - kStoppedShownNs, [&](const auto& key) { return train.needs(key); });
 }
 

@@ -61,8 +61,9 @@ class MonitorService {
   [[nodiscard]] TrainSeen train_seen();
   void look_for_silence();
   void publish_services();
-  void look_for_problems();
-  void forget_stopped();
+  void await_data();
+  void look_for_problems(const TrainSeen& train);
+  void forget_stopped(const TrainSeen& train);
 
   // monitor_shows.cpp: what is said to those who look
   [[nodiscard]] std::optional<track::EdgePosition> place() const;
@@ -106,7 +107,7 @@ class MonitorService {
   messaging::ServiceBoard services_;  // by the monotonic clock, as all times here
   Newest<msg::TrainState> state_;
   int64_t state_sent_ns_ = 0;               // arrival of the one last published
-  std::optional<int64_t> awaits_since_ns_;  // the first state: since fusion was heard, or the data began anew
+  std::optional<int64_t> awaits_since_ns_;  // the first state: since fusion was heard, or the data began
   Newest<msg::TrainPose> pose_;
   Newest<msg::PositionFix> choice_;
   Newest<msg::GnssFix> gnss_;

@@ -136,7 +136,7 @@ std::vector<json> MonitorService::first(const std::string& kind) {
   if (kind == "log") return {log_message(json(log_))};
   if (kind == "reports") return reports_.messages();
   if (kind == "problems") {
-    if (!looked_) look_for_problems();
+    if (!looked_) look_for_problems(train_seen());
     return {problems_message(problems_.problems(), now_ns, core::wall_ns())};
   }
   if (kind == "recorder" && recent(recorder_)) {

@@ -120,15 +120,26 @@ void judge_topics(const TrainSeen& train, Problems& problems) {
 void judge_silence_of_fusion(const TrainSeen& train, Problems& problems) {
   const auto* fusion = train.services->find("fusion");
   const bool runs = fusion != nullptr && fusion->alive && !fusion->stopped();  // otherwise that is the problem
-  if (train.played || !runs || train.awaited_s.value_or(0) < kStartS) return;
+  if (train.played || !runs) return;
+  if (const auto* waits = waiting_source(*train.services)) {
+    if (core::seconds(train.now_ns - waits->since_ns) < kStartS) return;
+    const std::string name = waits->name();
+    problems.push_back({"not begun", Level::warning, "No position yet: " + name + " is ready, and waits to begin",
+                        "Recorded data: give it the command (railfix tell " + name + " start), or set " + name +
+                            ".start: immediately. A live device: see its log."});
+    return;
+  }
+  if (train.awaited_s.value_or(0) < kStartS) return;
   problems.push_back({"no position", Level::error, "No position of this train has been heard yet",
                       "See what fusion says, and whether camera, odometry and sensors give anything."});
 }
 
 void judge_place(const TrainSeen& train, const msg::TrainState& state, Problems& problems) {
   if (!train.on_map()) {
-    problems.push_back({"map", Level::warning, "This train has no map: distance and speed, but no position",
-                        "Give it one (map of the train, or fusion.map and monitor.map)."});
+    problems.push_back({"map", Level::warning,
+                        "The monitor has no map, and fusion names no place: distance and speed, but no position",
+                        "Give the train a map (map of the train, or fusion.map and monitor.map); where fusion has one, "
+                        "see why it knows no place on it."});
   } else if (state.track_known() == 0) {
     problems.push_back(
         {"track", Level::warning,
@@ -169,7 +180,7 @@ void judge_position(const TrainSeen& train, Problems& problems) {
     problems.push_back({"unusable", Level::error,
                         "The position must not be used" + (reason.empty() ? "" : ": " + reason),
                         "See which sensors and services are degraded or silent."});
-  } else if (state->integrity() == msg::INTEGRITY_DEGRADED && train.on_map()) {
+  } else if (state->integrity() == msg::INTEGRITY_DEGRADED) {
     problems.push_back({"integrity", Level::warning, "The position is held by less than usual",
                         "See the reason that fusion gives, and which sensors are degraded."});
   }
@@ -232,6 +243,17 @@ void judge_rest(const TrainSeen& train, Problems& problems) {
 Expected Expected::of(const std::string& text) {
   const size_t at = text.find('@');
   return at == std::string::npos ? Expected{text, ""} : Expected{text.substr(0, at), text.substr(at + 1)};
+}
+
+const messaging::ServiceSeen* waiting_source(const messaging::ServiceBoard& services) {
+  const messaging::ServiceSeen* waits = nullptr;
+  for (const auto& [key, seen] : services.services()) {
+    const bool gives_data = key.second == "frame_grabber" || key.second == "sensor_gateway";
+    if (!gives_data || !seen.alive || seen.stopped()) continue;
+    if (seen.status.state() != msg::STATE_READY) return nullptr;
+    if (waits == nullptr || key.second == "frame_grabber") waits = &seen;  // which the other one follows
+  }
+  return waits;
 }
 
 bool TrainSeen::needs(const messaging::ServiceBoard::Key& key) const {

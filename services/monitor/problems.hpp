@@ -51,7 +51,7 @@ struct TrainSeen {
   std::vector<Topic> topics;  // those that are listened to
   std::optional<msg::TrainState> state;
   double state_age_s = 0;
-  std::optional<double> awaited_s;       // without a state: since fusion was first heard, or since the data began anew
+  std::optional<double> awaited_s;       // without a state: since fusion was first heard, or since the data began
   bool no_map = false;                   // the monitor has none
   std::optional<double> state_behind_s;  // its stamp behind the wall clock when it came; live data only
   std::optional<msg::RecorderStatus> recorder;
@@ -74,11 +74,15 @@ struct TrainSeen {
   [[nodiscard]] const msg::TrainState* position_now() const {
     return state && state_age_s < kPositionOldS ? &*state : nullptr;
   }
-  /// Whether there is a map on which the place can be known: the monitor's, or one that only fusion has.
+  /// Whether a map is known of on which the place can be: the monitor's, or one that only fusion has, which it does not
+  /// show before it has placed the train.
   [[nodiscard]] bool on_map() const { return !no_map || (state && (state->edge() != 0 || state->track_known() != 0)); }
   /// Whether the train lacks this service when it is not there: not if another host has it in its place.
   [[nodiscard]] bool needs(const messaging::ServiceBoard::Key& key) const;
 };
+
+/// Has data and waits to begin, as recorded data does for its command; nullptr while anybody has begun or cannot.
+[[nodiscard]] const messaging::ServiceSeen* waiting_source(const messaging::ServiceBoard& services);
 
 /// Without since_ns.
 std::vector<Problem> find_problems(const TrainSeen& train);

@@ -16,13 +16,18 @@ constexpr double kUsualShare = 0.1;  // of a new gap in the usual one
 constexpr double kGapFactor = 3;
 constexpr double kShortestGapS = 0.02;
 constexpr int64_t kHistoryNs = 2 * core::kNsPerSecond;
+constexpr int64_t kGoneNs = 60 * core::kNsPerSecond;
+constexpr int64_t kStandingGoneNs = 3600 * core::kNsPerSecond;  // such a value may come once in a long while
 
 }  // namespace
 
 bool BeforeListening::was_sent(const SeenSample& sample) {
   if (!standing_) return false;
-  const int64_t met_ns = met_ns_.try_emplace(sample.writer, sample.arrived_ns).first->second;
-  return sample.arrived_ns - met_ns < kHistoryNs && sample.sent_ns() < since_ns_;
+  Met& met = met_.try_emplace(sample.writer, Met{sample.arrived_ns, 0}).first->second;
+  met.last_ns = sample.arrived_ns;
+  const bool may_be_old = sample.arrived_ns - met.first_ns < kHistoryNs;
+  std::erase_if(met_, [&](const auto& one) { return sample.arrived_ns - one.second.last_ns > kStandingGoneNs; });
+  return may_be_old && sample.sent_ns() < since_ns_;
 }
 
 TopicStatistics::Slice& TopicStatistics::slice(int64_t at_ns) {
@@ -37,6 +42,7 @@ void TopicStatistics::add(const SeenSample& sample) {
   if (samples_ == 0) first_ns_ = sample.arrived_ns;
   note_pace(sample);
   last_ns_ = std::max(last_ns_, sample.arrived_ns);
+  forget_gone();
   ++samples_;
   bytes_ += sample.bytes;
   Slice& now = slice(sample.arrived_ns);
@@ -58,6 +64,11 @@ void TopicStatistics::note_pace(const SeenSample& sample) {
   }
   Slice& now = slice(pace.last_ns);
   now.longest_gap_ns = std::max(now.longest_gap_ns, gap_ns);
+}
+
+// A writer that was started anew is another one: the pace of the one before it is nobody's.
+void TopicStatistics::forget_gone() {
+  std::erase_if(paces_, [this](const auto& one) { return last_ns_ - one.second.last_ns > kGoneNs; });
 }
 
 double TopicStatistics::usual_gap_s() const {

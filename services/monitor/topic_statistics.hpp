@@ -53,8 +53,12 @@ class BeforeListening {
 
  private:
   bool standing_ = false;
-  int64_t since_ns_ = 0;                // monotonic
-  std::map<uint64_t, int64_t> met_ns_;  // each writer's first sample here
+  int64_t since_ns_ = 0;  // monotonic
+  struct Met {
+    int64_t first_ns = 0;
+    int64_t last_ns = 0;
+  };
+  std::map<uint64_t, Met> met_;  // each writer's samples here
 };
 
 class TopicStatistics {
@@ -68,7 +72,8 @@ class TopicStatistics {
     return latency_counts_;
   }
   [[nodiscard]] double latency_sum_s() const { return latency_sum_s_; }
-  /// Pause between samples of a writer as it usually is, the shortest of all writers; 0 = not known yet.
+  /// Pause between samples of a writer as it usually is, the shortest of all that have come in the minute before the
+  /// newest sample; 0 = not known yet.
   [[nodiscard]] double usual_gap_s() const;
 
  private:
@@ -91,6 +96,7 @@ class TopicStatistics {
   };
   void note_latency(const SeenSample& sample);
   void note_pace(const SeenSample& sample);
+  void forget_gone();
   Slice& slice(int64_t at_ns);
 
   uint64_t samples_ = 0;

@@ -16,8 +16,8 @@ constexpr std::chrono::milliseconds kSilenceCheck{500};
 /// A sensor may be switched on later than the train: nothing here waits for it.
 void SensorGatewayService::prepare_live() {
   const auto& live = config_.live;
-  wanted_ = {Wanted{live.imu}, Wanted{live.wheel}, Wanted{live.gnss}};
-  for (auto& one : wanted_) one.heard_ns = core::monotonic_ns();
+  wanted_ = {live.imu, live.wheel, live.gnss};
+  silence_ = SensorSilence(wanted_, live.silent_s, core::monotonic_ns());
   context_.at_stop([this] { feeds_.clear(); });
   context_.health().ready();
   for (auto& sensor : core::value_or_throw(make_live_sensors(live))) feed_from(std::move(sensor));
@@ -33,6 +33,7 @@ void SensorGatewayService::feed_from(std::unique_ptr<LiveSensor> sensor) {
   events.gone = [this, source](const std::string& why) {
     context_.post([this, source, why] {
       troubles_[source] = why;
+      silence_.gone(source);
       say_live();
     });
   };
@@ -43,15 +44,11 @@ void SensorGatewayService::feed_from(std::unique_ptr<LiveSensor> sensor) {
 }
 
 void SensorGatewayService::take(const std::string& source, const Delivery& delivery) {
-  const int64_t now_ns = core::monotonic_ns();
-  frame_watches_[source].add(delivery.frames, now_ns);
+  frame_watches_[source].add(delivery.frames, core::monotonic_ns());
   if (delivery.frames.broken > 0) context_.health().dropped(delivery.frames.broken);
-  if (!delivery.samples.empty()) complaints_[source] = delivery.complaint;
-  // Behind an outage of the whole source none of its sensors has been silent by itself.
-  if (!delivery.samples.empty() && troubles_.erase(source) > 0) {
-    for (auto& one : wanted_) {
-      if (one.source == source) one.heard_ns = now_ns;
-    }
+  if (!delivery.samples.empty()) {
+    complaints_[source] = delivery.complaint;
+    troubles_.erase(source);
   }
   for (const auto& sample : delivery.samples) hear(sample);
   say_live();
@@ -60,14 +57,13 @@ void SensorGatewayService::take(const std::string& source, const Delivery& deliv
 /// An IMU that sits otherwise than it is said to measures another motion than the train's.
 void SensorGatewayService::hear(const Sample& sample) {
   context_.health().input();
-  auto& wanted = wanted_[sample.index()];
-  wanted.heard_ns = core::monotonic_ns();
+  silence_.heard(sample.index(), core::monotonic_ns());
   if (const auto* imu = std::get_if<dataset::ImuRow>(&sample)) {
     gravity_watch_.add(*imu);
     if (!gravity_watch_.trouble().empty()) return context_.health().dropped(1);
     if (!gravity_watch_.agrees()) return;
   }
-  wanted.used = true;
+  used_[sample.index()] = true;
   std::visit([this](const auto& row) { publish(row); }, sample);
 }
 
@@ -89,22 +85,17 @@ std::string SensorGatewayService::live_troubles() {
   }
   if (const auto why = gravity_watch_.trouble(); !why.empty()) add(why);
   for (size_t i = 0; i < wanted_.size(); ++i) {
-    const auto& one = wanted_[i];
-    if (one.source.empty()) continue;
-    const bool silent = core::seconds(now_ns - one.heard_ns) > config_.live.silent_s;
-    const bool delivers = std::any_of(wanted_.begin(), wanted_.end(), [&](const Wanted& other) {
-      return other.source == one.source && other.heard_ns > one.heard_ns;
-    });
-    if (silent && delivers && !troubles_.contains(one.source)) add(fmt::format(fmt::runtime(kLacks[i]), one.source));
+    if (silence_.lacks(i, now_ns)) add(fmt::format(fmt::runtime(kLacks[i]), wanted_[i]));
   }
   return reasons;
 }
 
 void SensorGatewayService::say_live() {
   if (const std::string reasons = live_troubles(); !reasons.empty()) return context_.health().degraded(reasons);
-  const bool all_used =
-      std::all_of(wanted_.begin(), wanted_.end(), [](const Wanted& one) { return one.source.empty() || one.used; });
-  if (all_used) context_.health().active();
+  for (size_t i = 0; i < wanted_.size(); ++i) {
+    if (!wanted_[i].empty() && !used_[i]) return;
+  }
+  context_.health().active();
 }
 
 }  // namespace railfix::sensor_gateway

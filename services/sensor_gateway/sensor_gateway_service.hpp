@@ -12,6 +12,7 @@
 #include "sensor_gateway/playback.hpp"
 #include "sensor_gateway/sensor_feed.hpp"
 #include "sensor_gateway/sensor_gateway_config.hpp"
+#include "sensor_gateway/sensor_silence.hpp"
 #include "service/service.hpp"
 
 namespace railfix::sensor_gateway {
@@ -61,13 +62,10 @@ class SensorGatewayService {
   uint64_t wheel_seq_ = 0;
   uint64_t gnss_seq_ = 0;
   uint64_t clock_seq_ = 0;
-  int64_t clock_sent_ns_ = 0;  // monotonic
-  struct Wanted {              // a live sensor
-    std::string source;
-    bool used = false;
-    int64_t heard_ns = 0;  // monotonic; before its first sample, since when it is waited for
-  };
-  std::array<Wanted, std::variant_size_v<Sample>> wanted_;  // in the order of Sample
+  int64_t clock_sent_ns_ = 0;      // monotonic
+  SensorSilence::Sources wanted_;  // live sensors
+  std::array<bool, std::variant_size_v<Sample>> used_{};
+  SensorSilence silence_;
   GravityWatch gravity_watch_;
   bool gravity_told_ = false;
   std::map<std::string, std::string> troubles_;      // of each source, since its last sample

@@ -95,7 +95,7 @@ int64_t UbxReadings::Tag::ns(uint32_t tag_ms) {
 void UbxReadings::connected() {
   pending_.clear();
   axes_ = {};
-  together_ns_ = kTogetherNs;
+  periods_ns_.fill(2 * kTogetherNs);
   has_bytes_ = has_frames_ = has_measurements_ = false;
   broken_in_a_row_ = 0;
 }
@@ -167,17 +167,23 @@ void UbxReadings::read_measurements(std::span<const uint8_t> payload, int64_t ar
   if (imu_ns) add_imu(*imu_ns, samples);
 }
 
-// Nearer than half its period is only what belongs to the same sample.
 void UbxReadings::set_axis(Axis& axis, const Axis& now) {
   const int64_t period_ns = now.tag_ns - axis.tag_ns;
-  if (axis.tag_ns != 0 && period_ns > 0) together_ns_ = std::min(together_ns_, period_ns / 2);
+  if (axis.tag_ns != 0 && period_ns > 0) periods_ns_[next_period_++ % periods_ns_.size()] = period_ns;
   axis = now;
+}
+
+// Nearer than half its period is only what belongs to the same sample. The shortest, as a lost message makes one
+// longer; of the last ones, as a single odd tag would part what belongs together for ever.
+int64_t UbxReadings::together_ns() const {
+  return std::min(kTogetherNs, *std::min_element(periods_ns_.begin(), periods_ns_.end()) / 2);
 }
 
 // Rates and accelerations come in one message or in two. What another message's loss has left alone is no part of a
 // later sample: one pair that is apart would make all behind it so.
 void UbxReadings::add_imu(int64_t tag_ns, std::vector<Sample>& samples) {
-  for (auto& axis : axes_) axis.fresh = axis.fresh && std::abs(tag_ns - axis.tag_ns) <= together_ns_;
+  const int64_t together_ns = this->together_ns();
+  for (auto& axis : axes_) axis.fresh = axis.fresh && std::abs(tag_ns - axis.tag_ns) <= together_ns;
   const bool complete = std::all_of(axes_.begin(), axes_.end(), [](const Axis& axis) { return axis.fresh; });
   if (!complete || tag_ns == last_imu_ns_) return;
   last_imu_ns_ = tag_ns;

@@ -56,6 +56,7 @@ class UbxReadings {
   void read_measurements(std::span<const uint8_t> payload, int64_t arrival_ns, std::vector<Sample>& samples);
   size_t broken(size_t bytes);
   void set_axis(Axis& axis, const Axis& now);
+  [[nodiscard]] int64_t together_ns() const;
   void add_imu(int64_t tag_ns, std::vector<Sample>& samples);
   [[nodiscard]] bool counted_on(const Count& count, uint32_t ticks) const;
   void add_wheel(uint32_t data, const Count& count, std::vector<Sample>& samples);
@@ -64,8 +65,9 @@ class UbxReadings {
   std::vector<uint8_t> pending_;
   Tag imu_tag_;
   Tag wheel_tag_;
-  std::array<Axis, 6> axes_;  // rates x, y, z in rad/s; accelerations x, y, z in m/s^2
-  int64_t together_ns_ = 0;   // tags of one sample are no further apart
+  std::array<Axis, 6> axes_;              // rates x, y, z in rad/s; accelerations x, y, z in m/s^2
+  std::array<int64_t, 24> periods_ns_{};  // of the axes, the last four of each: a ring
+  size_t next_period_ = 0;
   std::optional<int64_t> last_imu_ns_;
   std::optional<Count> last_count_;
   int64_t pulses_ = 0;

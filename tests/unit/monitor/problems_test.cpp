@@ -135,11 +135,36 @@ TEST_F(ProblemsTest, JudgesNoPositionThatIsOld) {
   EXPECT_THAT(find_problems(train_), IsEmpty());
 }
 
-TEST_F(ProblemsTest, ATrainWithoutAMapLacksTheMapAndNothingElse) {
+// Recorded data waits for its command, for as long as its people like.
+TEST_F(ProblemsTest, DataThatWaitsToBeginIsNoErrorAndItsCommandIsNamed) {
+  const auto note_since = [this](double s, const msg::ServiceStatus& said) {
+    board_.note(said, kNow_ns - core::to_ns(s));
+    board_.note(said, kNow_ns);
+  };
+  train_.state.reset();
+  train_.awaited_s = 11;
+  note_since(11, status("sensor_gateway", msg::STATE_READY));
+  train_.now_ns = kNow_ns - core::to_ns(2);
+  EXPECT_THAT(find_problems(train_), IsEmpty()) << "railfix run waits until all are connected";
+  train_.now_ns = kNow_ns;
+  EXPECT_THAT(only().what_to_do, HasSubstr("railfix tell sensor_gateway start"));
+  note_since(11, status("frame_grabber", msg::STATE_READY));
+  EXPECT_THAT(only().what, HasSubstr("frame_grabber is ready, and waits to begin"));
+  EXPECT_THAT(only().what_to_do, HasSubstr("railfix tell frame_grabber start"));
+  EXPECT_EQ(only().level, Level::warning);
+  board_.note(status("frame_grabber", msg::STATE_ACTIVE), kNow_ns);
+  EXPECT_EQ(only().what, "No position of this train has been heard yet");
+  EXPECT_EQ(only().level, Level::error) << "its pictures come";
+  board_.note(status("frame_grabber", msg::STATE_STOPPED), kNow_ns);
+  EXPECT_THAT(find_problems(train_).back().what, HasSubstr("sensor_gateway is ready"));
+}
+
+TEST_F(ProblemsTest, AMonitorWithoutAMapLacksTheMapAndNoTrack) {
   train_.no_map = true;
   train_.state->track_known(0);
+  EXPECT_THAT(only().what, HasSubstr("The monitor has no map, and fusion names no place"));
   train_.state->integrity(msg::INTEGRITY_DEGRADED);
-  EXPECT_THAT(only().what, HasSubstr("This train has no map"));
+  EXPECT_THAT(find_problems(train_).back().what, HasSubstr("held by less than usual")) << "fusion may have one";
   train_.state->edge(3);  // fusion has one
   EXPECT_THAT(find_problems(train_).front().what, HasSubstr("not known which track"));
 }

@@ -86,6 +86,19 @@ TEST(TopicStatistics, CountsTheGapsOfEachWriter) {
   EXPECT_EQ(topic.numbers(kBegin_ns + 12'000 * kMs).gaps, 1U) << "the first one was silent for two seconds";
 }
 
+// Ten samples a second of one writer; it is started anew, and has one in three seconds from then on.
+TEST(TopicStatistics, ForgetsThePaceOfAWriterThatIsGone) {
+  TopicStatistics topic;
+  for (int i = 0; i < 100; ++i) topic.add(sample(100 * i, static_cast<uint64_t>(i)));
+  EXPECT_NEAR(topic.usual_gap_s(), 0.1, 1e-3);
+  for (int i = 0; i < 30; ++i) {
+    auto anew = sample(10'000 + 3'000 * i, static_cast<uint64_t>(i));
+    anew.writer = 8;
+    topic.add(anew);
+  }
+  EXPECT_NEAR(topic.usual_gap_s(), 3, 1e-3);
+}
+
 TEST(BeforeListening, IsOnlyWhatAStandingValueWas) {
   constexpr int64_t kHour_ms = 3'600'000;
   const int64_t since_ns = kBegin_ns;

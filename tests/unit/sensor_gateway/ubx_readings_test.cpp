@@ -99,6 +99,20 @@ TEST_F(UbxReadingsTest, ALineThatIsJoinedBetweenTheTwoMessagesOfASampleFindsItsP
   EXPECT_THAT(apart, ::testing::Each(0));
 }
 
+// Whose accelerations are tagged 3 ms behind its rates; those of 105 come 9 ms too early.
+TEST_F(UbxReadingsTest, AnOddTagCostsAFewSamplesAndNotAllBehindIt) {
+  std::vector<int64_t> ticks;
+  for (int tick = 100; tick < 115; ++tick) {
+    const auto tag_ms = static_cast<uint32_t>(10 * tick - (tick == 105 ? 9 : 0));
+    say(ubx_measurements(tag_ms, {{14, tick}, {13, 0}, {5, 0}}));
+    for (const auto& sample : say(ubx_measurements(tag_ms + 3, {{16, tick}, {17, 0}, {18, 0}})))
+      ticks.push_back(std::lround(std::get<dataset::ImuRow>(sample).accel_mps2[0] * 1024));
+  }
+  ASSERT_GE(ticks.size(), 10U);
+  EXPECT_THAT(std::vector(ticks.begin(), ticks.begin() + 5), ElementsAre(100, 101, 102, 103, 104));
+  EXPECT_THAT(std::vector(ticks.end() - 5, ticks.end()), ElementsAre(110, 111, 112, 113, 114));
+}
+
 TEST_F(UbxReadingsTest, AWheelForwardBackwardAndAroundItsCounter) {
   EXPECT_EQ(pulses_at(100, 0x7FFFF0), 0);
   EXPECT_EQ(pulses_at(200, 0x7FFFFF), 15);
