@@ -110,13 +110,14 @@ core::Result<std::unique_ptr<Recording>> RecordingMaker::create(const fs::path& 
                                                                 const mcap::WriterOptions& options) {
   about_["started_ns"] = std::to_string(core::wall_ns());
   auto recording = Recording::create(file, options, about_next());
+  if (!recording.ok()) return recording;
+  if (const auto text = core::read_whole(config_.train_file); text.ok()) {
+    const auto status = recording.value()->write_metadata(
+        {"railfix_configuration", {{"file", config_.train_file}, {"text", without_secrets(text.value())}}});
+    if (!status.ok()) return status.error();
+  }
   // Only now: what the disk refuses has not been begun, and is the next one again.
-  if (recording.ok() && is_configured(file)) file_begun_ = true;
-  const auto text = core::read_whole(config_.train_file);
-  if (!recording.ok() || !text.ok()) return recording;
-  const auto status = recording.value()->write_metadata(
-      {"railfix_configuration", {{"file", config_.train_file}, {"text", without_secrets(text.value())}}});
-  if (!status.ok()) return status.error();
+  if (is_configured(file)) file_begun_ = true;
   return recording;
 }
 
