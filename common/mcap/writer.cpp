@@ -83,7 +83,7 @@ Writer::~Writer() {
 }
 
 void Writer::discard() {
-  (void)wait_for_sync();
+  wait_for_sync();
   if (descriptor_ >= 0) ::close(std::exchange(descriptor_, -1));
   std::error_code failed;
   std::filesystem::remove(active_, failed);
@@ -93,7 +93,7 @@ core::Status Writer::put(ByteView bytes) {
   if (descriptor_ < 0) return core::Error{file_.string() + " is closed already"};
   if (!core::write_all(descriptor_, std::as_bytes(bytes))) {
     const core::Error error = io_error("cannot be written; is the disk full?", active_);
-    (void)wait_for_sync();
+    wait_for_sync();
     // Half a record would hide everything behind it.
     if (::ftruncate(descriptor_, static_cast<off_t>(offset_)) != 0 ||
         ::lseek(descriptor_, static_cast<off_t>(offset_), SEEK_SET) < 0) {
@@ -170,7 +170,8 @@ core::Status Writer::write(const Message& message) {
   statistics_.count(message.channel_id, message.log_time_ns);
   // It is taken: a chunk that the disk refuses is tried again with the next message, in tick() and in close().
   (void)flush_old_chunk();
-  return sync_when_due();
+  sync_when_due();
+  return {};
 }
 
 core::Status Writer::write_metadata(const Metadata& metadata) {
@@ -186,7 +187,8 @@ core::Status Writer::write_metadata(const Metadata& metadata) {
 
 core::Status Writer::tick() {
   auto status = flush_old_chunk();
-  return status.ok() ? sync_when_due() : status;
+  sync_when_due();
+  return status.ok() ? last_sync_ : status;
 }
 
 core::Status Writer::flush_old_chunk() {
@@ -195,10 +197,10 @@ core::Status Writer::flush_old_chunk() {
   return old || chunk_.size() >= options_.chunk_bytes ? flush_chunk() : core::Status();
 }
 
-core::Status Writer::sync_when_due() {
+void Writer::sync_when_due() {
   const bool due =
       options_.sync_period_s > 0 && core::monotonic_ns() - synced_ns_ >= core::to_ns(options_.sync_period_s);
-  return due ? sync_beside() : core::Status();
+  if (due) sync_beside();
 }
 
 core::Status Writer::flush_chunk() {
@@ -243,12 +245,11 @@ core::Status Writer::sync() {
 }
 
 // A busy disk takes seconds for this, and messages must not wait for it.
-core::Status Writer::sync_beside() {
-  if (syncing_.valid() && syncing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return {};
-  auto status = wait_for_sync();
+void Writer::sync_beside() {
+  if (syncing_.valid() && syncing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  wait_for_sync();
   synced_ns_ = core::monotonic_ns();
   syncing_ = std::async(std::launch::async, [this] { return sync(); });
-  return status;
 }
 
 bool Writer::is_removed() const {
@@ -256,8 +257,8 @@ bool Writer::is_removed() const {
   return descriptor_ >= 0 && ::fstat(descriptor_, &ours) == 0 && ours.st_nlink == 0;
 }
 
-core::Status Writer::wait_for_sync() {
-  return syncing_.valid() ? syncing_.get() : core::Status();
+void Writer::wait_for_sync() {
+  if (syncing_.valid()) last_sync_ = syncing_.get();
 }
 
 namespace {
@@ -322,7 +323,7 @@ core::Status Writer::write_tail() {
 
 core::Status Writer::close() {
   if (descriptor_ < 0) return {};
-  const core::Status synced = wait_for_sync();
+  wait_for_sync();
   core::Status status = flush_chunk();
   if (status.ok()) status = write_tail();
   if (status.ok()) status = sync();
@@ -334,7 +335,7 @@ core::Status Writer::close() {
   if (failed)
     return core::Error{active_.string() + ": cannot be renamed to " + file_.string() + " (" + failed.message() + ")"};
   sync_folder(file_);
-  return synced;
+  return last_sync_;
 }
 
 }  // namespace railfix::mcap

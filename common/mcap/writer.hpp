@@ -54,7 +54,8 @@ class Writer {
   /// behind its last whole record, and a later call may succeed.
   core::Status write(const Message& message);
   core::Status write_metadata(const Metadata& metadata);
-  /// Closes a chunk that is too old and syncs when due; write() does the same. For callers whose messages may stop.
+  /// Closes a chunk that is too old and syncs when due; write() does the same, but what the disk says of it, and of
+  /// the last sync until one succeeds, is said here and by close(): the messages were taken.
   core::Status tick();
   /// Writes summary and footer, syncs, and gives the file its final name.
   core::Status close();
@@ -80,10 +81,10 @@ class Writer {
   core::Status put(ByteView bytes);
   core::Status flush_chunk();
   core::Status flush_old_chunk();
-  core::Status sync_when_due();
+  void sync_when_due();
   core::Status sync();
-  core::Status sync_beside();
-  core::Status wait_for_sync();
+  void sync_beside();
+  void wait_for_sync();
   core::Status write_tail();
 
   std::filesystem::path file_;
@@ -94,6 +95,7 @@ class Writer {
   uint32_t data_crc_ = 0;
   int64_t synced_ns_ = 0;
   std::future<core::Status> syncing_;
+  core::Status last_sync_;  // of those that have ended
   Bytes chunk_;
   ChunkHead chunk_head_;
   int64_t chunk_begun_ns_ = 0;

@@ -9,18 +9,18 @@ namespace {
 constexpr int kPicturesHeld = 3;
 }  // namespace
 
-RealPace::Verdict RealPace::ask(int64_t stamp_ns, int64_t wall_ns) {
+RealPace::Verdict RealPace::ask(int64_t stamp_ns, int64_t now_ns) {
   if (!newest_ns_) {
-    if (!begun_) wall_minus_data_ns_ = wall_ns - stamp_ns;
+    if (!begun_) wall_minus_data_ns_ = now_ns - stamp_ns;
     begun_ = true;
     newest_ns_ = stamp_ns;
     return {stamp_ns + wall_minus_data_ns_, false};
   }
-  if (stamp_ns <= *newest_ns_) return {wall_ns, false};
+  if (stamp_ns <= *newest_ns_) return {now_ns, false};
   const int64_t period_ns = stamp_ns - *newest_ns_;
   newest_ns_ = stamp_ns;
   const int64_t due_ns = stamp_ns + wall_minus_data_ns_;
-  return {due_ns, wall_ns - due_ns > kPicturesHeld * period_ns};
+  return {due_ns, now_ns - due_ns > kPicturesHeld * period_ns};
 }
 
 void LockStep::begin() {

@@ -11,12 +11,12 @@
 
 namespace railfix::frame_grabber {
 
-/// Recorded rate on the wall clock: the first picture is due when it comes (unless it is said when), each other as much
-/// later as it was recorded later.
+/// Recorded rate on the clock of the player, which goes on evenly when the wall clock is set (Player::now_ns()): the
+/// first picture is due when it comes (unless it is said when), each other as much later as it was recorded later.
 class RealPace {
  public:
   struct Verdict {
-    int64_t due_ns = 0;  // wall clock; in the past = now
+    int64_t due_ns = 0;  // on that clock; in the past = now
     bool skip = false;   // more than three periods late
   };
   RealPace() = default;
@@ -24,7 +24,7 @@ class RealPace {
   explicit RealPace(std::optional<int64_t> wall_minus_data_ns)
       : wall_minus_data_ns_(wall_minus_data_ns.value_or(0)), begun_(wall_minus_data_ns.has_value()) {}
   /// REQUIRES: in the order of playing. A picture that is stamped before one already played is due at once.
-  Verdict ask(int64_t stamp_ns, int64_t wall_ns);
+  Verdict ask(int64_t stamp_ns, int64_t now_ns);
   /// Due time minus stamp of every picture. REQUIRES: asked once.
   [[nodiscard]] int64_t wall_minus_data_ns() const { return wall_minus_data_ns_; }
 

@@ -62,7 +62,8 @@ struct PlayerEvents {
 class Player {
  public:
   /// Starts at once. real_pace false: the next picture comes as soon as the last one is complete. began_ns, with real
-  /// pace: wall clock at which the first picture was due; those that would have been played by now are passed over.
+  /// pace: when the first picture was due, by the wall clock as it is set now; those that would have been played by now
+  /// are passed over.
   Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, size_t read_ahead, PlayerEvents events,
          std::optional<int64_t> began_ns = {});
   ~Player();
@@ -81,7 +82,7 @@ class Player {
   bool too_late(int64_t stamp_ns, int64_t decode_ns) const;
   bool real_pace_;
   int64_t wall_minus_monotonic_ns_;
-  std::optional<int64_t> anchor_ns_;  // wall clock minus stamp, where it is known beforehand
+  std::optional<int64_t> anchor_ns_;  // due time by now_ns() minus stamp, where it is known beforehand
   PlayerEvents events_;
   std::mutex mutex_;
   std::condition_variable changed_;

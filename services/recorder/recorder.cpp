@@ -13,7 +13,6 @@ namespace fs = std::filesystem;
 
 constexpr int64_t kTickNs = core::kNsPerSecond / 4;
 constexpr int64_t kSplitAgainNs = core::kNsPerSecond;
-constexpr double kRoomAgain = 2;  // times keep_free_mb: enough to record for some time
 
 std::string type_of_topic(const std::string& name) {
   const auto* topic = messaging::find_topic(name);
@@ -23,8 +22,9 @@ std::string type_of_topic(const std::string& name) {
 }  // namespace
 
 Recorder::Recorder(const RecorderConfig& config, messaging::Participant& participant,
-                   const std::map<std::string, std::string>& about, std::function<void(int64_t)> on_picture)
-    : config_(config), maker_(config, about), on_picture_(std::move(on_picture)) {
+                   const std::map<std::string, std::string>& about, std::function<void(int64_t)> on_picture,
+                   FreeSpace free_space)
+    : config_(config), maker_(config, about), on_picture_(std::move(on_picture)), free_space_(std::move(free_space)) {
   for (const auto& rule : config_.events) {
     rules_.push_back(core::value_or_throw(EventRule::parse(rule, type_of_topic)));
   }
@@ -129,9 +129,9 @@ RecorderState Recorder::take_state() {
 core::Result<std::string> Recorder::begin(const fs::path& file) {
   if (recording_) return core::Error{recording_->file().string() + " is being recorded already; stop it first"};
   const fs::path name = file.empty() ? maker_.next_name() : maker_.named(file);
-  if (disk_has_less_than(1, name)) return core::Error{wait_for_room("nothing is recorded: the disk of ", name)};
+  if (disk_has_less_than(1, name)) return refuse_without_room(name, !file.empty());
   count_dropped();  // not of this file
-  auto created = maker_.create(name);
+  auto created = file.empty() ? maker_.create_next(name) : maker_.create(name);
   for (const auto& sentence : maker_.take_warnings()) say(sentence, true);
   if (!created.ok()) {
     problem_ = created.error().message;
@@ -293,50 +293,6 @@ void Recorder::tick() {
   go_on_by_itself();
   tend_event_files(false);
   publish_state();
-}
-
-bool Recorder::disk_has_less_than(double times, const fs::path& file) const {
-  fs::path folder = fs::absolute(file).parent_path();
-  std::error_code failed;
-  while (!fs::exists(folder, failed) && folder.has_relative_path()) folder = folder.parent_path();
-  return static_cast<double>(free_bytes(folder)) < times * config_.keep_free_mb * kBytesPerMb;
-}
-
-fs::path Recorder::file_on_disk() const {
-  return recording_ ? recording_->file() : maker_.folder() / "next";
-}
-
-void Recorder::guard_disk() {
-  const fs::path file = file_on_disk();
-  if (!disk_has_less_than(1, file)) return;
-  event_ends_ns_ = 0;
-  if (!recording_) return;
-  const auto ended = end();
-  (void)wait_for_room("recording stopped: the disk of ", file);
-  if (!ended.ok()) problem_ += "; " + ended.error().message;
-}
-
-std::string Recorder::wait_for_room(const std::string& what, const fs::path& file) {
-  const auto mb = [this](double times) { return std::to_string(static_cast<int64_t>(times * config_.keep_free_mb)); };
-  goes_on_by_itself_ = true;
-  problem_ = what + file.string() + " has less than " + mb(1) + " MB free; goes on in a new file when " +
-             mb(kRoomAgain) + " MB are free";
-  return problem_;
-}
-
-void Recorder::leave_removed_file() {
-  const std::string file = recording_->file().string();
-  (void)end();
-  goes_on_by_itself_ = true;
-  problem_ = file + kActive +
-             " was removed while it was being recorded, and what it held is lost; see who empties the folder, "
-             "recording goes on in a new file";
-  say(problem_, true);
-}
-
-void Recorder::go_on_by_itself() {
-  if (!goes_on_by_itself_ || disk_has_less_than(kRoomAgain, file_on_disk())) return;
-  if (const auto begun = begin(""); begun.ok()) say("recording goes on in " + begun.value(), false);
 }
 
 void Recorder::use(const Arrival& arrival) {

@@ -10,6 +10,7 @@
 #include "recorder/event_rule.hpp"
 #include "recorder/housekeeper.hpp"
 #include "recorder/recording_maker.hpp"
+#include "recorder/recordings_folder.hpp"
 #include "recorder/ring.hpp"
 #include "recorder/topic_inlet.hpp"
 
@@ -21,7 +22,8 @@ struct RecorderState {
   bool paused = false;     // ... and nothing goes into it
   bool ring = false;       // the last seconds are kept in memory
   bool is_wanted = false;  // it records from the beginning: without a file somebody, or a full disk, has stopped it
-  bool goes_on_by_itself = false;  // not recording, and waits for the disk
+  bool goes_on_by_itself = false;  // not recording, and waits until a file can be begun: there was no room, or the
+                                   // open one was removed
   std::string file;
   int64_t started_ns = 0;  // of the file
   uint64_t messages = 0;   // in the file
@@ -44,6 +46,9 @@ struct RecorderState {
   std::vector<News> news;  // since the last call of take_state()
 };
 
+/// Bytes on the disk of a folder.
+using FreeSpace = std::function<uint64_t(const std::filesystem::path& folder)>;
+
 /// `writer_thread_` takes samples from the topics and writes them; the members are its own, but for `queue_`,
 /// `housekeeper_`, `state_` and `ending_`, which any thread may use. The other threads belong to what it owns: the
 /// inlet has one that encodes pictures, the housekeeper one that looks after the folder, each event's file one that
@@ -54,9 +59,10 @@ class Recorder {
  public:
   /// `on_picture` is called from the recorder's thread with the stamp of each picture that was dealt with. Throws
   /// BadInput for an event rule that cannot be meant, a topic to leave out that there is not, or one that cannot be
-  /// read.
+  /// read. `free_space`: what the disk of a folder has left; tests say something else.
   Recorder(const RecorderConfig& config, messaging::Participant& participant,
-           const std::map<std::string, std::string>& about, std::function<void(int64_t stamp_ns)> on_picture);
+           const std::map<std::string, std::string>& about, std::function<void(int64_t stamp_ns)> on_picture,
+           FreeSpace free_space = free_bytes);
   /// Closes all files.
   ~Recorder();
   Recorder(const Recorder&) = delete;
@@ -92,10 +98,13 @@ class Recorder {
   void guard_disk();
   void leave_removed_file();
   void go_on_by_itself();
+  void go_on();
   /// Less than so many times keep_free_mb are free where this file is or would be.
   [[nodiscard]] bool disk_has_less_than(double times, const std::filesystem::path& file) const;
   /// The open one, or some other where the next one would be.
   [[nodiscard]] std::filesystem::path file_on_disk() const;
+  [[nodiscard]] std::string disk_is_full(const std::filesystem::path& file) const;
+  core::Error refuse_without_room(const std::filesystem::path& file, bool is_named);
   /// The sentence, which is the problem until it goes on.
   std::string wait_for_room(const std::string& what, const std::filesystem::path& file);
   void publish_state();
@@ -110,6 +119,7 @@ class Recorder {
   RecorderConfig config_;
   RecordingMaker maker_;
   std::function<void(int64_t)> on_picture_;
+  FreeSpace free_space_;
   std::vector<EventRule> rules_;
   std::map<const EventRule*, int64_t> rule_happened_ns_;
   std::unique_ptr<Housekeeper> housekeeper_;

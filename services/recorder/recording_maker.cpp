@@ -32,10 +32,10 @@ fs::path RecordingMaker::folder() const {
 }
 
 // A second start must not take away what the first one recorded.
-fs::path RecordingMaker::next_name() {
+fs::path RecordingMaker::next_name() const {
   if (config_.file.empty()) return timed_name();
   const fs::path first(config_.file);
-  if (!std::exchange(file_begun_, true)) return first;
+  if (!file_begun_) return first;
   fs::path next;
   for (int i = 2; next.empty() || is_taken(next); ++i) {
     next = first.parent_path() / (first.stem().string() + "-" + std::to_string(i) + first.extension().string());
@@ -88,17 +88,36 @@ void RecordingMaker::put_aside_cut_off(const fs::path& file) {
                                    "; `railfix recording repair` makes a proper file of it");
 }
 
-core::Result<std::unique_ptr<Recording>> RecordingMaker::create(const fs::path& file) {
+core::Result<std::unique_ptr<Recording>> RecordingMaker::create_next(const fs::path& file) {
   mcap::WriterOptions options = writer_options();
-  options.overwrite = !config_.file.empty() && file == config_.file;
+  options.overwrite = !file_begun_ && is_configured(file);
   if (options.overwrite) put_aside_cut_off(file);
+  return create(file, options);
+}
+
+// Whoever says a name does not know what is there.
+core::Result<std::unique_ptr<Recording>> RecordingMaker::create(const fs::path& file) {
+  return create(file, writer_options());
+}
+
+bool RecordingMaker::is_configured(const fs::path& file) const {
+  std::error_code failed;
+  return !config_.file.empty() &&
+         fs::weakly_canonical(fs::absolute(file), failed) == fs::weakly_canonical(fs::absolute(config_.file), failed);
+}
+
+core::Result<std::unique_ptr<Recording>> RecordingMaker::create(const fs::path& file,
+                                                                const mcap::WriterOptions& options) {
   about_["started_ns"] = std::to_string(core::wall_ns());
   auto recording = Recording::create(file, options, about_next());
-  const auto text = core::read_whole(config_.train_file);
-  if (!recording.ok() || !text.ok()) return recording;
-  const auto status = recording.value()->write_metadata(
-      {"railfix_configuration", {{"file", config_.train_file}, {"text", without_secrets(text.value())}}});
-  if (!status.ok()) return status.error();
+  if (!recording.ok()) return recording;
+  if (const auto text = core::read_whole(config_.train_file); text.ok()) {
+    const auto status = recording.value()->write_metadata(
+        {"railfix_configuration", {{"file", config_.train_file}, {"text", without_secrets(text.value())}}});
+    if (!status.ok()) return status.error();
+  }
+  // Only now: what the disk refuses has not been begun, and is the next one again.
+  if (is_configured(file)) file_begun_ = true;
   return recording;
 }
 

@@ -1,9 +1,13 @@
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
 #include <fstream>
+#include <thread>
 
 #include "mcap/check.hpp"
 #include "recordings.hpp"
@@ -260,6 +264,28 @@ TEST_F(RecordingTest, AMessageThatFindsNoRoomIsAnError) {
   const FullAt here(writer->bytes_written());
   EXPECT_TRUE(writer->write({channel, 0, 0, 0, bytes_of(std::string(60, '{'))}).ok());
   EXPECT_FALSE(writer->write({channel, 1, 1, 1, bytes_of(std::string(60, '{'))}).ok()) << "memory has an end, too";
+}
+
+// A pipe cannot be forced to a disk.
+TEST_F(RecordingTest, AMessageIsNotCalledLostWhenTheFileCannotBeForcedToTheDisk) {
+  const auto file = folder_ / "pipe.mcap";
+  const auto pipe = file.string() + ".active";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int other_end = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  WriterOptions options;
+  options.overwrite = true;
+  options.sync_period_s = 1e-9;
+  auto writer = Writer::create(file, options).value();
+  const uint16_t channel = writer->add_channel(0, "log_record", "json", {}).value();
+  for (uint32_t i = 0; i < 20; ++i) {
+    EXPECT_TRUE(writer->write({channel, i, i, i, bytes_of("{}")}).ok()) << i;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  for (const auto& told : {writer->tick(), writer->tick(), writer->close()}) {
+    ASSERT_FALSE(told.ok());
+    EXPECT_THAT(told.error().message, HasSubstr("cannot be forced to the disk"));
+  }
+  ::close(other_end);
 }
 
 TEST_F(RecordingTest, KnowsWhenItsFileWasRemoved) {

@@ -48,9 +48,9 @@ class RecorderTest : public ::testing::Test {
     return options;
   }
   std::unique_ptr<Recorder> recorder() {
-    return std::make_unique<Recorder>(config_, participant_,
-                                      std::map<std::string, std::string>{{"train_id", "demo"}, {"version", "test"}},
-                                      [this](int64_t stamp_ns) { last_picture_ns_ = stamp_ns; });
+    return std::make_unique<Recorder>(
+        config_, participant_, std::map<std::string, std::string>{{"train_id", "demo"}, {"version", "test"}},
+        [this](int64_t stamp_ns) { last_picture_ns_ = stamp_ns; }, free_space_);
   }
   static void fill(msg::CameraFrame& frame, uint64_t seq) {
     frame.stamp_ns(1000 + static_cast<int64_t>(seq));
@@ -66,6 +66,7 @@ class RecorderTest : public ::testing::Test {
   fs::path folder_;
   messaging::Participant participant_;
   RecorderConfig config_;
+  FreeSpace free_space_ = free_bytes;  // asked in the recorder's thread
   std::atomic<int64_t> last_picture_ns_ = 0;
 };
 

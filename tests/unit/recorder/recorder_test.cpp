@@ -1,6 +1,5 @@
 // Real topics inside one process, recorded into a file.
 #include <gmock/gmock.h>
-#include <sys/mount.h>
 
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -222,106 +221,11 @@ TEST_F(RecorderTest, LinesOfTheLogFromBeforeItListenedAreRecordedAndNoEvent) {
   EXPECT_THAT(texts, ::testing::ElementsAre("cannot be opened", "gives up", "now"));
 }
 
-TEST_F(RecorderTest, AFileThatIsRemovedIsSaidAndItGoesOnInANewFile) {
-  messaging::Writer<msg::CameraCalibration> calibration(participant_, topics::camera_calibration);
-  ASSERT_TRUE(calibration.write({}));
-  auto recorder = this->recorder();
-  const auto started = recorder->start((folder_ / "ride.mcap").string());
-  ASSERT_TRUE(started.ok());
-  ASSERT_TRUE(wait_until([&] { return recorder->state().written == 1; }));
-  fs::remove_all(folder_);
-  ASSERT_TRUE(wait_until([&] { return recorder->state().recording && recorder->state().file != started.value(); }))
-      << recorder->state().problem;
-  std::string said;
-  for (const auto& news : recorder->take_state().news) said += news.sentence + "\n";
-  EXPECT_THAT(said, HasSubstr("ride.mcap.active was removed while it was being recorded"));
-  EXPECT_THAT(said, HasSubstr("recording goes on in " + recorder->state().file));
-  ASSERT_TRUE(wait_until([&] { return recorder->state().messages == 1; })) << "standing values are in it";
-  EXPECT_TRUE(recorder->stop().ok());
-}
-
-// The command comes before, while and after the thread leaves the file by itself.
-TEST_F(RecorderTest, ACommandWaitsForWhatTheThreadDoesByItself) {
-  auto recorder = this->recorder();
-  for (int i = 0; i < 12; ++i) {
-    const auto started = recorder->start("");
-    ASSERT_TRUE(started.ok()) << started.error().message;
-    fs::remove(started.value() + kActive);
-    ::usleep(static_cast<useconds_t>(i) * 25'000);
-    (void)recorder->stop();
-    ASSERT_TRUE(wait_until([&] { return !recorder->state().recording || recorder->stop().ok(); }));
-    EXPECT_EQ(recorder->state().failure, "");
-  }
-}
-
-TEST_F(RecorderTest, WhatACrashLeftOfTheConfiguredFileIsPutAside) {
-  config_.file = (folder_ / "run.mcap").string();
-  fs::create_directories(folder_);
-  for (const char* aside : {"run-cut-off.mcap.active", "run-cut-off-2.mcap.active"}) {
-    std::ofstream(folder_ / "run.mcap.active") << aside;
-    auto recorder = this->recorder();
-    ASSERT_TRUE(recorder->start("").ok());
-    const auto news = recorder->take_state().news;
-    ASSERT_EQ(news.size(), 1U);
-    EXPECT_THAT(news[0].sentence, HasSubstr("run.mcap.active was left by a crash and is now "));
-    std::string kept;
-    std::ifstream(folder_ / aside) >> kept;
-    EXPECT_EQ(kept, aside);
-    ASSERT_TRUE(recorder->stop().ok());
-  }
-  EXPECT_TRUE(mcap::Reader::open(config_.file).value()->indexed());
-}
-
-TEST_F(RecorderTest, ABareNameIsOneInTheFolder) {
-  auto recorder = this->recorder();
-  EXPECT_EQ(recorder->start("ride1").value(), folder_ / "ride1.mcap");
-  EXPECT_TRUE(recorder->housekeeper().protect("ride1", "by hand").ok());
-  ASSERT_TRUE(recorder->stop().ok());
-  EXPECT_EQ(recorder->start("ride2.mcap").value(), folder_ / "ride2.mcap");
-}
-
-TEST_F(RecorderTest, AFullDiskIsRefusedAndLeavesNoFile) {
-  config_.keep_free_mb = 1e12;
-  auto recorder = this->recorder();
-  const auto started = recorder->start((folder_ / "full.mcap").string());
-  ASSERT_FALSE(started.ok());
-  EXPECT_THAT(started.error().message, HasSubstr("MB free; goes on in a new file when "));
-  EXPECT_TRUE(recorder->state().goes_on_by_itself);
-  EXPECT_FALSE(recorder->state().recording);
-  EXPECT_FALSE(fs::exists(folder_));
-  EXPECT_TRUE(recorder->stop().ok()) << "does not wait any more";
-  EXPECT_FALSE(recorder->state().goes_on_by_itself);
-}
-
 TEST_F(RecorderTest, ATopicToLeaveOutThatThereIsNotIsRefused) {
   config_.leave_out = {"camera_frame/cam0", "log_record"};
   EXPECT_NO_THROW((void)recorder());
   config_.leave_out = {"log_recrod"};
   EXPECT_THROW((void)recorder(), core::BadInput);
-}
-
-// On a small disk of its own.
-TEST_F(RecorderTest, GoesOnByItselfWhenThereIsRoomAgain) {
-  fs::create_directories(folder_);
-  if (mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=20m") != 0) GTEST_SKIP() << "a disk can be made by root only";
-  config_.keep_free_mb = 5;
-  {
-    auto recorder = this->recorder();
-    const auto started = recorder->start("");
-    ASSERT_TRUE(started.ok());
-    std::ofstream(folder_ / "filler") << std::string(17'000'000, ' ');
-    EXPECT_TRUE(wait_until([&] { return !recorder->state().recording; }));
-    EXPECT_TRUE(mcap::Reader::open(started.value()).value()->indexed()) << "it is closed properly";
-    EXPECT_THAT(recorder->state().problem, HasSubstr("goes on in a new file when 10 MB are free"));
-    fs::remove(folder_ / "filler");
-    EXPECT_TRUE(wait_until([&] { return recorder->state().recording; }));
-    EXPECT_EQ(recorder->state().problem, "");
-    std::ofstream(folder_ / "filler") << std::string(17'000'000, ' ');
-    EXPECT_TRUE(wait_until([&] { return !recorder->state().recording; }));
-    EXPECT_TRUE(recorder->stop().ok()) << "does not begin again";
-    EXPECT_EQ(recorder->state().problem, "");
-  }
-  umount2(folder_.c_str(), MNT_DETACH);
 }
 
 TEST_F(RecorderTest, RecordingsAreNumberedAlsoAfterARestart) {
@@ -335,29 +239,6 @@ TEST_F(RecorderTest, RecordingsAreNumberedAlsoAfterARestart) {
       EXPECT_EQ(about.value().entries.at("number"), std::to_string(2 * i + k + 1));
     }
   }
-}
-
-TEST_F(RecorderTest, ASecondStartKeepsWhatTheFirstRecorded) {
-  config_.file = (folder_ / "run.mcap").string();
-  auto recorder = this->recorder();
-  for (const char* name : {"run.mcap", "run-2.mcap", "run-3.mcap"}) {
-    const auto started = recorder->start("");
-    ASSERT_TRUE(started.ok()) << started.error().message;
-    EXPECT_EQ(started.value(), folder_ / name);
-    ASSERT_TRUE(recorder->stop().ok());
-  }
-  EXPECT_TRUE(fs::exists(folder_ / "run.mcap"));
-}
-
-TEST_F(RecorderTest, AFileThatCannotBeLookedAtIsRefusedAndItGoesOn) {
-  fs::create_directories(folder_);
-  fs::create_symlink("loop", folder_ / "loop");
-  auto recorder = this->recorder();
-  for (const auto& file : {folder_ / "loop", folder_ / "loop" / "x.mcap", folder_ / std::string(300, 'x')}) {
-    EXPECT_FALSE(recorder->start(file).ok());
-  }
-  EXPECT_TRUE(recorder->start("").ok());
-  EXPECT_EQ(recorder->state().failure, "");
 }
 
 TEST_F(RecorderTest, WhatIsThrownInItsThreadClosesTheFileAndIsSaid) {
