@@ -83,7 +83,8 @@ void SensorGatewayService::follow(const msg::DataClock& clock) {
     anchor_.reset();
     playback_.play_until(clock.data_ns(), sinks_);
   } else {
-    anchor_ = {clock.data_ns(), core::monotonic_ns() - (core::wall_ns() - clock.wall_ns())};
+    const int64_t now_ns = core::monotonic_ns();
+    anchor_ = {service::DataTime(clock, core::wall_ns(), now_ns).at(now_ns), now_ns};
   }
   if (clock.ended() != 0) end();
 }

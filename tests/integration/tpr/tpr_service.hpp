@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "core/time.hpp"
+#include "core/units.hpp"
 #include "etcs/train_position_report.hpp"
 #include "messaging/topics.hpp"
 #include "support/network.hpp"
@@ -75,6 +76,7 @@ class TprService : public ::testing::Test {
     state.speed_mps(speed_mps);
     state.standstill(speed_mps == 0 ? 1 : 0);
     state.easting_m(easting_m);
+    state.heading_rad(core::kPi / 2);  // the line runs eastwards
     state.over_m(3);
     state.under_m(4);
     states_.write(state);
