@@ -2,6 +2,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <array>
 
 #include "core/time.hpp"
 #include "sensor_gateway/sensor_gateway_service.hpp"
@@ -69,9 +70,10 @@ void SensorGatewayService::hear(const Sample& sample) {
 
 /// A source that is gone says why itself; one that delivers may still lack one of its sensors.
 std::string SensorGatewayService::live_troubles() {
-  constexpr const char* kLacks[] = {
+  // In the order of Sample; GNSS has its source to itself.
+  static constexpr std::array kLacks{
       "no IMU samples from {}, which sends others; switch on gyroscope and accelerometer in its UBX-ESF-MEAS",
-      "no wheel pulses from {}, which sends others; check the wheel's cable, and that its receiver takes pulses", ""};
+      "no wheel pulses from {}, which sends others; check the wheel's cable, and that its receiver takes pulses"};
   std::string reasons;
   const auto add = [&reasons](const std::string& why) { reasons += (reasons.empty() ? "" : "; ") + why; };
   const int64_t now_ns = core::monotonic_ns();
@@ -84,7 +86,7 @@ std::string SensorGatewayService::live_troubles() {
     if (!why.empty() && !troubles_.contains(source)) add(why);
   }
   if (const auto why = gravity_watch_.trouble(); !why.empty()) add(why);
-  for (size_t i = 0; i < wanted_.size(); ++i) {
+  for (size_t i = 0; i < kLacks.size(); ++i) {
     if (silence_.lacks(i, now_ns)) add(fmt::format(fmt::runtime(kLacks[i]), wanted_[i]));
   }
   return reasons;
