@@ -18,6 +18,8 @@ struct ServiceSeen {
   int64_t since_ns = 0;  // in this state, for this reason, alive or not
   bool alive = true;     // has said something lately
   [[nodiscard]] bool stopped() const { return status.state() == msg::STATE_STOPPED; }
+  /// It shows signs of life and has not been stopped.
+  [[nodiscard]] bool runs() const { return alive && !stopped(); }
   [[nodiscard]] std::string name() const { return status.service().c_str(); }
 };
 

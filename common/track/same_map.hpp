@@ -5,16 +5,9 @@
 #include <cmath>
 
 #include "core/units.hpp"
-#include "track/map.hpp"
+#include "track/ways.hpp"
 
 namespace railfix::track {
-
-/// Where the cab looks at a place: along the edge or against it.
-/// REQUIRES: the edge is on the map.
-inline PlanPose cab_pose(const Map& map, const EdgePosition& place) {
-  const PlanPose along = map.edge(place.edge)->alignment.at(place.offset_m).pose;
-  return place.direction == Direction::reverse ? turned_round(along) : along;
-}
 
 /// A place that somebody else says, where on his map the cab looks along the track so: does it lie there on this map,
 /// too, in that direction? Coordinates that are not told (0, 0 or no numbers) contradict nothing, nor does a heading

@@ -32,6 +32,11 @@ Run run_of(const Map& map, const EdgePosition& place) {
   return {map.edge(place.edge), place.direction != Direction::reverse};
 }
 
+PlanPose cab_pose(const Map& map, const EdgePosition& place) {
+  const Run run = run_of(map, place);
+  return run.pose_at(run.into_m(place.offset_m));
+}
+
 double turn_rad(const Run& run, const Run& next) {
   return std::abs(core::wrap_pi(next.pose_at(0).heading_rad - run.pose_at(run.length_m()).heading_rad));
 }

@@ -29,6 +29,9 @@ struct Run {
 /// Of a train there, unknown direction = forward. REQUIRES: the edge is on the map.
 [[nodiscard]] Run run_of(const Map& map, const EdgePosition& place);
 
+/// Where the cab of a train there is and looks. REQUIRES: the edge is on the map.
+[[nodiscard]] PlanPose cab_pose(const Map& map, const EdgePosition& place);
+
 /// By how much a train turns where it runs on from one onto the next, 0 to pi.
 [[nodiscard]] double turn_rad(const Run& run, const Run& next);
 

@@ -78,7 +78,7 @@ class GenicamCamera final : public LiveCamera {
   void note_nothing_came();
   void note_incomplete(ArvBuffer* buffer);
   RawPicture picture_of(ArvBuffer* buffer);
-  int64_t mid_exposure_ns(ArvBuffer* buffer);
+  int64_t mid_exposure_ns(ArvBuffer* buffer, bool host_time);
   [[nodiscard]] bool shows_host_time(ArvBuffer* buffer) const;
   void count_lost_before(uint64_t frame_id);
 
@@ -259,8 +259,9 @@ RawPicture GenicamCamera::picture_of(ArvBuffer* buffer) {
     picture.bytes = static_cast<const uint8_t*>(data);
   }
   picture.exposure_s = exposure_s_;
-  picture.stamp_ns = mid_exposure_ns(buffer);
-  picture.no_host_time = config_.ptp && !shows_host_time(buffer);
+  const bool host_time = shows_host_time(buffer);
+  picture.stamp_ns = mid_exposure_ns(buffer, host_time);
+  picture.no_host_time = config_.ptp && !host_time;
   count_lost_before(arv_buffer_get_frame_id(buffer));
   picture.lost = take_lost();
   if (ARV_IS_GV_STREAM(stream_.get())) {
@@ -270,11 +271,11 @@ RawPicture GenicamCamera::picture_of(ArvBuffer* buffer) {
 }
 
 /// With PTP the camera's time is the begin of exposure; else the first packet leaves at its end.
-int64_t GenicamCamera::mid_exposure_ns(ArvBuffer* buffer) {
+int64_t GenicamCamera::mid_exposure_ns(ArvBuffer* buffer, bool host_time) {
   const auto camera_ns = static_cast<int64_t>(arv_buffer_get_timestamp(buffer));
   const auto arrival_ns = static_cast<int64_t>(arv_buffer_get_system_timestamp(buffer));
   const int64_t half_ns = core::to_ns(exposure_s_ / 2);
-  if (shows_host_time(buffer)) return camera_ns + half_ns;
+  if (host_time) return camera_ns + half_ns;
   const core::HostTime now = core::host_time();
   const int64_t waited_ns =
       std::clamp<int64_t>(now.wall_ns - arrival_ns, 0, core::kNsPerSecond);  // the clock may be set

@@ -11,15 +11,15 @@ constexpr int kPicturesHeld = 3;
 
 RealPace::Verdict RealPace::ask(int64_t stamp_ns, int64_t now_ns) {
   if (!newest_ns_) {
-    if (!begun_) wall_minus_data_ns_ = now_ns - stamp_ns;
+    if (!begun_) due_minus_stamp_ns_ = now_ns - stamp_ns;
     begun_ = true;
     newest_ns_ = stamp_ns;
-    return {stamp_ns + wall_minus_data_ns_, false};
+    return {stamp_ns + due_minus_stamp_ns_, false};
   }
   if (stamp_ns <= *newest_ns_) return {now_ns, false};
   const int64_t period_ns = stamp_ns - *newest_ns_;
   newest_ns_ = stamp_ns;
-  const int64_t due_ns = stamp_ns + wall_minus_data_ns_;
+  const int64_t due_ns = stamp_ns + due_minus_stamp_ns_;
   return {due_ns, now_ns - due_ns > kPicturesHeld * period_ns};
 }
 

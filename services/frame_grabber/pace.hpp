@@ -21,15 +21,15 @@ class RealPace {
   };
   RealPace() = default;
   /// Due time minus stamp is known before the first picture comes.
-  explicit RealPace(std::optional<int64_t> wall_minus_data_ns)
-      : wall_minus_data_ns_(wall_minus_data_ns.value_or(0)), begun_(wall_minus_data_ns.has_value()) {}
+  explicit RealPace(std::optional<int64_t> due_minus_stamp_ns)
+      : due_minus_stamp_ns_(due_minus_stamp_ns.value_or(0)), begun_(due_minus_stamp_ns.has_value()) {}
   /// REQUIRES: in the order of playing. A picture that is stamped before one already played is due at once.
   Verdict ask(int64_t stamp_ns, int64_t now_ns);
   /// Due time minus stamp of every picture. REQUIRES: asked once.
-  [[nodiscard]] int64_t wall_minus_data_ns() const { return wall_minus_data_ns_; }
+  [[nodiscard]] int64_t due_minus_stamp_ns() const { return due_minus_stamp_ns_; }
 
  private:
-  int64_t wall_minus_data_ns_ = 0;
+  int64_t due_minus_stamp_ns_ = 0;
   bool begun_ = false;
   std::optional<int64_t> newest_ns_;
 };

@@ -84,7 +84,7 @@ Player::Player(std::unique_ptr<dataset::PictureSource> source, bool real_pace, s
       thread_([this] { play(); }) {}
 
 bool Player::too_late(int64_t stamp_ns, int64_t decode_ns) const {
-  const int64_t offset_ns = wall_minus_data_ns_;
+  const int64_t offset_ns = due_minus_stamp_ns_;
   return real_pace_ && offset_ns != kNotBegun && now_ns() + decode_ns > stamp_ns + offset_ns;
 }
 
@@ -138,7 +138,7 @@ void Player::play() {
     dataset::Picture picture = std::move(*std::move(item.picture).value());
     if (real_pace_) {
       const auto verdict = pace.ask(picture.stamp_ns, now_ns());
-      wall_minus_data_ns_ = pace.wall_minus_data_ns();
+      due_minus_stamp_ns_ = pace.due_minus_stamp_ns();
       if (verdict.skip) {
         events_.late(picture.stamp_ns);
         continue;

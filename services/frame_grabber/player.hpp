@@ -89,7 +89,7 @@ class Player {
   bool stopped_ = false;
   bool complete_ = false;
   static constexpr int64_t kNotBegun = INT64_MIN;
-  std::atomic<int64_t> wall_minus_data_ns_ = kNotBegun;
+  std::atomic<int64_t> due_minus_stamp_ns_ = kNotBegun;
   ReadAhead pictures_;  // its thread uses all of the above
   std::thread thread_;
 };

@@ -10,7 +10,7 @@
 #include "messaging/messaging.hpp"
 #include "messaging/samples.hpp"
 #include "messaging/topics.hpp"
-#include "track/same_map.hpp"
+#include "track/ways.hpp"
 
 namespace railfix::map_matcher {
 

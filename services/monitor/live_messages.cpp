@@ -88,7 +88,7 @@ json services_message(const messaging::ServiceBoard& board, int64_t now_ns, int6
                         {"reason", status.reason().c_str()},
                         {"since_ns", wall_ns - (now_ns - seen.since_ns)},
                         {"age_s", core::seconds(now_ns - seen.received_ns)},
-                        {"alive", seen.alive && !seen.stopped()},
+                        {"alive", seen.runs()},
                         {"version", status.version().c_str()},
                         {"pid", status.pid()},
                         {"cpu_percent", status.cpu_percent()},

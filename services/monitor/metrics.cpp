@@ -99,7 +99,9 @@ void add_expected(Families& families, const TrainSeen& seen) {
 }
 
 // What a service that is silent said last of itself is not so any more.
-void add_work(Families& families, const msg::ServiceStatus& status, bool runs, const Labels& labels) {
+void add_work(Families& families, const messaging::ServiceSeen& service, const Labels& labels) {
+  const msg::ServiceStatus& status = service.status;
+  const bool runs = service.runs();
   families.gauge("railfix_service_cpu_ratio", "Processor cores in use.", runs ? status.cpu_percent() / 100 : kNaN,
                  labels);
   families.gauge("railfix_service_resident_bytes", "Memory in use.", runs ? status.rss_mb() * 1e6 : kNaN, labels);
@@ -118,17 +120,16 @@ void add_services(Families& families, const TrainSeen& seen) {
   for (const auto& [key, service] : seen.services->services()) {
     const Labels labels{{"service", service.name()}, {"host", key.first}};
     const auto& status = service.status;
-    const bool runs = service.alive && !service.stopped();
     if (!service.stopped() || seen.needs(key)) {
       families.gauge("railfix_service_up",
                      "1: it shows signs of life and has neither failed nor been stopped. Not of one that was stopped "
                      "and is not needed.",
-                     runs && status.state() != msg::STATE_FAILED ? 1 : 0, labels);
+                     service.runs() && status.state() != msg::STATE_FAILED ? 1 : 0, labels);
     }
     for (uint8_t state = msg::STATE_STARTING; state <= msg::STATE_STOPPED; ++state) {
       Labels with_state = labels;
       with_state.push_back({"state", messaging::name_of_state(state)});
-      const bool known = runs || service.stopped();
+      const bool known = service.alive || service.stopped();
       families.gauge("railfix_service_state",
                      "1 for the state that the service is in, 0 for all others, and for all when it is silent.",
                      known && status.state() == state ? 1 : 0, with_state);
@@ -139,7 +140,7 @@ void add_services(Families& families, const TrainSeen& seen) {
     families.counter("railfix_service_outputs_total", "Output samples sent.", status.frames_out(), labels);
     families.counter("railfix_service_dropped_total", "Inputs that were lost or came too late.", status.dropped(),
                      labels);
-    add_work(families, status, runs, labels);
+    add_work(families, service, labels);
   }
 }
 
@@ -158,11 +159,11 @@ void add_position(Families& families, const MetricsInput& input) {
                    seen.state ? seen.state_age_s : *seen.awaited_s);
   }
   if (!seen.state) return;
+  const auto* now = seen.position_now();
   families.gauge("railfix_position_behind_seconds",
                  "How old the last train_state was already when it came, by its stamp; NaN for played data, and when "
                  "the last one is old.",
-                 seen.position_now() ? seen.state_behind_s.value_or(kNaN) : kNaN);
-  const auto* now = seen.position_now();
+                 now != nullptr ? seen.state_behind_s.value_or(kNaN) : kNaN);
   const auto gauge = [&](const std::string& name, const std::string& help, double value) {
     families.gauge(name, (help + "; NaN = not known, or the last train_state is old.").c_str(), now ? value : kNaN);
   };

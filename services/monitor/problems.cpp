@@ -38,8 +38,7 @@ bool is_heard(const messaging::ServiceBoard& board, const Expected& wanted) {
 
 bool runs_elsewhere(const TrainSeen& train, const messaging::ServiceBoard::Key& key) {
   return std::ranges::any_of(train.services->services(), [&](const auto& entry) {
-    return entry.first.second == key.second && entry.first.first != key.first && entry.second.alive &&
-           !entry.second.stopped();
+    return entry.first.second == key.second && entry.first.first != key.first && entry.second.runs();
   });
 }
 
@@ -119,8 +118,7 @@ void judge_topics(const TrainSeen& train, Problems& problems) {
 
 void judge_silence_of_fusion(const TrainSeen& train, Problems& problems) {
   const auto* fusion = train.services->find("fusion");
-  const bool runs = fusion != nullptr && fusion->alive && !fusion->stopped();  // otherwise that is the problem
-  if (train.played || !runs) return;
+  if (train.played || fusion == nullptr || !fusion->runs()) return;  // that it is not there is said
   if (const auto* waits = waiting_source(*train.services)) {
     if (core::seconds(train.now_ns - waits->since_ns) < kStartS) return;
     const std::string name = waits->name();
@@ -249,7 +247,7 @@ const messaging::ServiceSeen* waiting_source(const messaging::ServiceBoard& serv
   const messaging::ServiceSeen* waits = nullptr;
   for (const auto& [key, seen] : services.services()) {
     const bool gives_data = key.second == "frame_grabber" || key.second == "sensor_gateway";
-    if (!gives_data || !seen.alive || seen.stopped()) continue;
+    if (!gives_data || !seen.runs()) continue;
     if (seen.status.state() != msg::STATE_READY) return nullptr;
     if (waits == nullptr || key.second == "frame_grabber") waits = &seen;  // which the other one follows
   }

@@ -80,11 +80,10 @@ void SensorGatewayService::follow(const msg::DataClock& clock) {
   const int64_t born_ns = clock.data_ns() - (clock.wall_ns() - born_wall_ns_);
   begin(clock.lock_step() != 0 ? lead_from_ns : std::max(lead_from_ns, born_ns));
   if (clock.lock_step() != 0 || clock.ended() != 0) {
-    anchor_.reset();
+    ahead_ns_.reset();
     playback_.play_until(clock.data_ns(), sinks_);
   } else {
-    const int64_t now_ns = core::monotonic_ns();
-    anchor_ = {service::DataTime(clock, core::wall_ns(), now_ns).at(now_ns), now_ns};
+    ahead_ns_ = service::DataTime(clock, core::wall_ns(), core::monotonic_ns()).at(0);
   }
   if (clock.ended() != 0) end();
 }
@@ -98,21 +97,21 @@ std::string SensorGatewayService::nothing_to_play() const {
 core::Result<std::string> SensorGatewayService::start() {
   const auto first = playback_.next_ns();
   if (!first) return core::Error{nothing_to_play()};
-  if (anchor_) return std::string("plays already");
+  if (ahead_ns_) return std::string("plays already");
   begin(*first);
-  anchor_ = {*first, core::monotonic_ns()};
+  ahead_ns_ = *first - core::monotonic_ns();
   return std::string("plays ") + config_.source;
 }
 
 void SensorGatewayService::play_on() {
-  if (!anchor_) return;
+  if (!ahead_ns_) return;
   const int64_t now_ns = core::monotonic_ns();
-  const int64_t data_ns = anchor_->data_ns + (now_ns - anchor_->monotonic_ns);
+  const int64_t data_ns = now_ns + *ahead_ns_;
   playback_.play_until(data_ns, sinks_);
   if (!clock_) return;
   if (!playback_.next_ns()) {
     publish_clock(data_ns, true);
-    anchor_.reset();
+    ahead_ns_.reset();
     return end();
   }
   if (now_ns - clock_sent_ns_ >= service::DataTime::kPeriodNs) publish_clock(data_ns, false);

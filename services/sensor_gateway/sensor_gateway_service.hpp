@@ -43,10 +43,6 @@ class SensorGatewayService {
   void publish(const dataset::WheelRow& row);
   void publish(const dataset::GnssRow& row);
 
-  struct Anchor {
-    int64_t data_ns;
-    int64_t monotonic_ns;  // the wall clock may be set
-  };
   Config config_;
   service::Context& context_;
   int64_t born_wall_ns_;
@@ -56,7 +52,7 @@ class SensorGatewayService {
   Playback playback_;  // of nothing with live sensors
   Sinks sinks_;
   std::optional<messaging::Writer<msg::DataClock>> clock_;  // with clock own
-  std::optional<Anchor> anchor_;                            // real pace, while it plays
+  std::optional<int64_t> ahead_ns_;                         // of the monotonic clock; real pace, while it plays
   bool begun_ = false;
   uint64_t imu_seq_ = 0;
   uint64_t wheel_seq_ = 0;

@@ -6,7 +6,7 @@
 
 #include "core/random.hpp"
 #include "support/on_map_matcher.hpp"
-#include "track/same_map.hpp"
+#include "track/ways.hpp"
 
 namespace railfix {
 namespace {

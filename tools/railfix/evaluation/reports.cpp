@@ -9,6 +9,7 @@
 #include "etcs/train_position_report.hpp"
 #include "track/path.hpp"
 #include "track/track_finder.hpp"
+#include "track/ways.hpp"
 
 namespace railfix::evaluation {
 namespace {
@@ -61,8 +62,9 @@ class Judge {
       const int64_t between_ns = std::midpoint(rows[i - 1].stamp_ns, rows[i].stamp_ns);
       if (truth.at(between_ns)) pass(rows[i - 1], rows[i]);  // not over a gap
     }
-    follow(rows.front(), false);
-    follow(rows.back(), true);
+    const track::TrackFinder tracks(ground.map);
+    follow(tracks, rows.front(), false);
+    follow(tracks, rows.back(), true);
   }
 
   void judge(const ReportRow& row, ReportResult& result) const {
@@ -86,11 +88,9 @@ class Judge {
 
  private:
   void place(const BaliseGroup& group) {
-    const track::Edge* edge = ground_.map->edge(group.edge);
-    if (edge == nullptr) return;
-    track::PlanPose pose = edge->alignment.at(group.offset_m).pose;
-    if (!group.nominal_is_forward) pose = track::turned_round(pose);
-    groups_[group.nid_lrbg()] = {&group, pose, {}};
+    if (ground_.map->edge(group.edge) == nullptr) return;
+    const auto nominal = group.nominal_is_forward ? track::Direction::forward : track::Direction::reverse;
+    groups_[group.nid_lrbg()] = {&group, track::cab_pose(*ground_.map, {group.edge, group.offset_m, nominal}), {}};
   }
 
   /// Between two rows of the truth.
@@ -121,8 +121,8 @@ class Judge {
 
   /// Groups that lie before the truth's first place or beyond its last one, over the straight way of every switch. One
   /// that the train has run past is where it was then.
-  void follow(const TruthRow& from, bool ahead) {
-    const std::optional<track::EdgePosition> start = position_of(from);
+  void follow(const track::TrackFinder& tracks, const TruthRow& from, bool ahead) {
+    const std::optional<track::EdgePosition> start = position_of(tracks, from);
     if (!start) return;
     const auto path = track::Path::follow(ground_.map, *start, ahead ? kFollowedM : 0, ahead ? 0 : kFollowedM);
     if (!path.ok()) return;
@@ -134,10 +134,10 @@ class Judge {
     }
   }
 
-  [[nodiscard]] std::optional<track::EdgePosition> position_of(const TruthRow& row) const {
+  [[nodiscard]] std::optional<track::EdgePosition> position_of(const track::TrackFinder& tracks,
+                                                               const TruthRow& row) const {
     if (!is_placed(row)) return std::nullopt;
-    for (const track::NearTrack& near :
-         track::TrackFinder(ground_.map).near(row.easting_m, row.northing_m, kOwnTrackM)) {
+    for (const track::NearTrack& near : tracks.near(row.easting_m, row.northing_m, kOwnTrackM)) {
       const double heading_rad = ground_.map->edge(near.edge)->alignment.at(near.offset_m).pose.heading_rad;
       const double along = std::cos(heading_rad - row.heading_rad);
       if (std::abs(along) < std::cos(0.2)) continue;  // a track that crosses

@@ -64,7 +64,7 @@ void TrainPicture::note_time(int64_t stamp_ns) {
 
 bool TrainPicture::gone(const std::string& service) const {
   const auto* seen = services.find(service);
-  return seen == nullptr || !seen->alive || seen->stopped() || seen->status.state() == msg::STATE_FAILED;
+  return seen == nullptr || !seen->runs() || seen->status.state() == msg::STATE_FAILED;
 }
 
 void Supervisor::note_status(const msg::ServiceStatus& status) {
