@@ -59,9 +59,8 @@ std::string why_given_up(Against because) {
 
 }  // namespace
 
-// Where masts stand everywhere, some are sighted by chance where the map has one.
 bool Estimator::gnss_denies_place() const {
-  const bool never_agreed = watch(Source::gnss).used_ns == 0 && place_.landmarks_agreed < kLandmarksBelieved;
+  const bool never_agreed = watch(Source::gnss).used_ns == 0 && !place_.told.believed();
   return watch(Source::gnss).isolated && (never_agreed || place_.wrong_place.lost());
 }
 
@@ -85,11 +84,11 @@ Interval Estimator::interval() const {
   // Since the last sample the train may have stopped counting, or the clock may have run ahead.
   const double silent_s = core::seconds(filter_.stamp_ns() - stamp_ns_);
   const double silent_m = silent_s > kFreshS ? std::abs(filter_.speed_mps()) * silent_s : 0;
-  const Sides ways = held_ways();
+  const Sides ways = place_.other_ways.held();
   Sides held{bound_m + ways.behind_m, bound_m + ways.ahead_m};
   held.hold(doubts_.refused);
   held.hold(doubts_.gnss);
-  return {centre_m() - held.behind_m - doubts_.time_m - silent_m, centre_m() + held.ahead_m};
+  return {centre_m() - held.behind_m - gap_.way_m() - silent_m, centre_m() + held.ahead_m};
 }
 
 double Estimator::known_to_m() const {
@@ -105,18 +104,10 @@ double Estimator::lost_to_m() const {
   return place_.wrong_place.lost() ? std::clamp(budgets_m, kLostAtLeastM, kLostAtMostM) : 0.0;
 }
 
-// As an odometer's accuracy is stated: a share of the way, and one slip at the highest speed.
 Interval Estimator::widened(const Interval& interval) const {
-  const auto& p = *parameters_;
-  const double once_m = p.wheel_slip_share * std::min(unwatched_.way_m, unwatched_.fastest_mps * p.wheel_slip_s);
-  const double slip_m = std::min(once_m + p.wheel_slip_per_m * unwatched_.way_m, p.wheel_slip_share * unwatched_.way_m);
   const bool held = gnss_proven() && used_within(Source::gnss, kHeldByGnssS);
   const double most_m = held ? gnss_bound_m() : std::numeric_limits<double>::infinity();
-  // A wheel that slides counts less than it is judged by.
-  const double slide_m = slip_m / (1 - std::min(p.wheel_slip_share, 0.9));
-  const auto& u = unwatched_;
-  Sides more{slip_m + u.hidden_m, slide_m + u.hidden_m};
-  for (const Apart& one : {u.counted, u.refused, u.felt}) more.add(one.most);
+  const Sides more = unwatched_.may_be_off(*parameters_);
   return {interval.rear_m - std::min(more.behind_m, most_m), interval.front_m + std::min(more.ahead_m, most_m)};
 }
 
@@ -136,7 +127,7 @@ TrainEstimate Estimator::estimate(const Interval& promised, double since_sure_m)
   e.since_reference_m = since_reference_m();
   e.since_sure_m = since_sure_m;
   e.reference = place_.reference;
-  e.standstill = standstill_;
+  e.standstill = standstill_.stands();
   e.track_known = place_.path != nullptr;
   e.track_probability = place_.path ? place_.track_doubt.probability_at(*place_.path, filter_.path_distance_m()) : 0;
   e.sigma_m = sigma_m();
@@ -208,7 +199,7 @@ void Estimator::judge_sensors(TrainEstimate& e) const {
     e.degrade("no wheel pulses");
   } else if (watch(Source::wheel).isolated) {
     e.degrade("wheel slips or slides" + since(watch(Source::wheel).changed_ns));
-  } else if (wheel_.scatters) {
+  } else if (wheel_.odometer.scatters()) {
     e.degrade("wheel readings scatter");
   }
   if (silent(Source::imu)) {
@@ -225,7 +216,7 @@ void Estimator::judge_place(TrainEstimate& e) const {
   const bool turned_away = place_.track_doubt.turns_otherwise() && place_.wrong_place.is_no_position();
   e.place_in_doubt = gnss_denies_place() || turned_away || place_.wrong_place.lost();
   if (gnss_denies_place() || turned_away) e.integrity = Integrity::unusable;
-  if (doubts_.time_m > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
+  if (gap_.way_m() > 0) e.degrade("a gap in time: the clock was set, or nothing measured");
   if (refused_fix_) e.degrade("a position fix was refused");
   if (corrected_) e.degrade("position was corrected by two fixes against the filter");
   if (off_path_) e.degrade("a position fix lies on another track");
@@ -240,14 +231,15 @@ void Estimator::judge_place(TrainEstimate& e) const {
   } else if (place_.track_doubt.disbelieved()) {
     e.degrade("map_matcher finds some other place far more probable");
   }
-  if (place_.told_by == ToldBy::gnss) e.degrade("GNSS alone has told the place: waits for a landmark");
-  if (place_.told_by == ToldBy::start_and_gnss) {
+  if (place_.told.by() == ToldBy::gnss) e.degrade("GNSS alone has told the place: waits for a landmark");
+  if (place_.told.by() == ToldBy::start_and_gnss) {
     e.degrade("the place was only told, and GNSS agrees to some 10 m only: waits for a landmark or curves");
   }
-  if (place_.told_by == ToldBy::start && !place_.wrong_place.lost()) {
-    e.degrade(place_.alike_beside ? "the place was only told, and what agrees is the same on a track beside it: waits "
-                                    "for a balise or a frog"
-                                  : "the place was only told: waits for a landmark or curves");
+  if (place_.told.by() == ToldBy::start && !place_.wrong_place.lost()) {
+    e.degrade(place_.told.alike_beside()
+                  ? "the place was only told, and what agrees is the same on a track beside it: waits "
+                    "for a balise or a frog"
+                  : "the place was only told: waits for a landmark or curves");
   }
   if (!place_.path) e.degrade("place on the map not known" + (place_.given_up ? why_given_up(*place_.given_up) : ""));
   if (place_.path &&

@@ -9,13 +9,7 @@ namespace railfix::fusion {
 namespace {
 
 constexpr double kAtWorkS = 0.3;
-constexpr double kRestM = 0.05;  // a train that moved less than this ...
-constexpr double kRestS = 1.0;   // ... for so long stands still
-constexpr double kRestSpeedSigmaMps = 0.3;
-constexpr double kRebaseS = 0.1;  // lost when the clock is set
-constexpr double kRhythmS = 0.003;
-constexpr double kGapS = 0.05;
-constexpr int kRhythmSamples = 10;
+constexpr double kRebaseS = 0.1;     // lost when the clock is set
 constexpr double kPointsOffM = 5.0;  // from where the map has them, or the wheels behind the foot
 
 template <class Input>
@@ -29,10 +23,10 @@ Estimator::Estimator(const FusionParameters* parameters, const OdometerScales& s
       filter_(*parameters, scales, stamp_ns, path != nullptr),
       stamp_ns_(stamp_ns),
       start_ns_(stamp_ns),
-      rest_since_ns_(stamp_ns) {
+      standstill_(stamp_ns) {
   if (!path) return;
   place_.path = std::move(path);
-  place_.told_by = ToldBy::start;
+  place_.told.tell(ToldBy::start);
   doubt_points_behind();
 }
 
@@ -50,31 +44,25 @@ void Estimator::predict_to(int64_t stamp_ns) {
 void Estimator::rebase_clock(int64_t stamp_ns) {
   filter_.rebase_clock(stamp_ns);
   stamp_ns_ = stamp_ns;
-  for (auto& watch : watches_) {
-    watch.seen_ns = std::min(watch.seen_ns, stamp_ns);
-    watch.used_ns = std::min(watch.used_ns, stamp_ns);
-    watch.changed_ns = std::min(watch.changed_ns, stamp_ns);
-  }
+  for (auto& watch : watches_) watch.set_clock(stamp_ns);
   accel_ = {};
   yaw_ = {};
   gyro_watch_.set_clock(stamp_ns);
   wheel_.blocks.clear();
   wheel_.window_begin_ns = 0;
   wheel_.counts_since_ns = std::min(wheel_.counts_since_ns, stamp_ns);
-  gap_begin_ns_ = std::min(gap_begin_ns_, stamp_ns);
+  gap_.set_clock(stamp_ns);
   filter_.doubt_time(kRebaseS);
   slip_watch_ = {};
   sudden_change_ = {};
-  rest_since_ns_ = stamp_ns;
+  standstill_.set_clock(stamp_ns);
   start_ns_ = std::min(start_ns_, stamp_ns);
 }
 
 void Estimator::apply(const Event& event, const FixContext& context) {
   context_ = context;
   slip_began_ = false;
-  fix_verdict_ = FixVerdict::none;
-  fix_offer_ = {};
-  fix_again_ = false;
+  fix_ = {};
   notice_gap(stamp_of(event));
   const double before_m = distance_m();
   std::visit(
@@ -84,18 +72,17 @@ void Estimator::apply(const Event& event, const FixContext& context) {
         stamp_ns_ = std::max(stamp_ns_, input.stamp_ns);
         const double here_m = distance_m();
         use(input);
-        // What a place corrects is no way: a train that stands goes on standing.
-        if constexpr (tells_place<std::decay_t<decltype(input)>>) rest_distance_m_ += distance_m() - here_m;
+        if constexpr (tells_place<std::decay_t<decltype(input)>>) standstill_.corrected(distance_m() - here_m);
       },
       event);
   if (place_.path) {
     place_.track_doubt.move(*place_.path, filter_.path_distance_m());
-    const double way_m = standstill_ ? 0 : std::abs(distance_m() - before_m);
+    const double way_m = standstill_.stands() ? 0 : std::abs(distance_m() - before_m);
     const bool turns_otherwise = place_.track_doubt.turns_otherwise() && !gnss_proven();
     place_.wrong_place.move(
         way_m, {turns_otherwise, place_.track_doubt.turns_otherwise_now(), gnss_denies_place(), is_off_map()});
   }
-  watch_standstill();
+  standstill_.look(distance_m(), filter_.sigma(StateIndex::speed), stamp_ns_);
 }
 
 // Wherever in its interval it is.
@@ -108,8 +95,7 @@ bool Estimator::is_off_map() const {
 }
 
 bool Estimator::used_within(Source source, double time_s) const {
-  const auto& w = watch(source);
-  return w.used_ns != 0 && !w.isolated && core::seconds(filter_.stamp_ns() - w.used_ns) < time_s;
+  return watch(source).used_within(time_s, filter_.stamp_ns());
 }
 
 bool Estimator::knows_motion(double bridge_s) const {
@@ -126,21 +112,8 @@ bool Estimator::in_the_dark() const {
 // by as much, and the sample itself says how far the train ran.
 void Estimator::doubt_time(const SensorWatch& watch, Rhythm& rhythm, int64_t stamp_ns) {
   if (watch.seen_ns == 0 || stamp_ns <= watch.seen_ns) return;
-  const double dt_s = core::seconds(stamp_ns - watch.seen_ns);
-  // While other sensors went on the clock did, too.
-  const double late_s = std::min(dt_s - rhythm.period_s, rhythm.pause_s);
-  const double off_s = std::max(late_s, rhythm.period_s - dt_s);
-  rhythm.pause_s = 0;
-  if (rhythm.samples >= kRhythmSamples && off_s > std::max(kRhythmS, 0.1 * rhythm.period_s)) {
-    filter_.doubt_time(off_s);
-    // So many have another rhythm than the first ones, of which some had been lost.
-    rhythm.off_s += dt_s;
-    if (++rhythm.off == kRhythmSamples) rhythm = {rhythm.off_s / rhythm.off, kRhythmSamples};
-  } else {
-    rhythm.period_s += (dt_s - rhythm.period_s) / std::min(++rhythm.samples, 20);
-    rhythm.off = 0;
-    rhythm.off_s = 0;
-  }
+  const double off_s = rhythm.add(core::seconds(stamp_ns - watch.seen_ns));
+  if (off_s > 0) filter_.doubt_time(off_s);
 }
 
 uint32_t Estimator::isolated() const {
@@ -181,7 +154,10 @@ void Estimator::exclude(Source source, const Estimator& other) {
   }
   if (source != Source::wheel) return;
   pulses_ = other.pulses_;
+  WheelOdometer odometer = wheel_.odometer;
+  odometer.go_on_from(other.wheel_.odometer);
   wheel_ = other.wheel_;
+  wheel_.odometer = odometer;
   wheel_.good_windows = 0;
   wheel_.window_begin_ns = filter_.stamp_ns();
   wheel_.window_m.reset();
@@ -198,8 +174,8 @@ void Estimator::place_like(const Estimator& other) {
   filter_.place_like(other.filter_);
   place_ = other.place_;
   doubts_.odometers_m = other.doubts_.odometers_m;
-  doubts_.time_m = std::max(doubts_.time_m, other.doubts_.time_m);
-  unwatched_ = other.unwatched_;
+  gap_.hold(other.gap_.way_m());
+  unwatched_.go_on_from(other.unwatched_);
 }
 
 // Distance and speed run on. What a false place has taught of the scales is forgotten with it. What GNSS said against a
@@ -216,26 +192,11 @@ void Estimator::give_place_up(Against because) {
   corrected_ = false;
 }
 
-// Nothing from any sensor for a while: the clock may have been set forward. What counts way over the gap tells.
 void Estimator::notice_gap(int64_t stamp_ns) {
   const double gap_s = core::seconds(stamp_ns - stamp_ns_);
   if (gap_s <= 0) return;
-  for (auto* rhythm : {&pictures_, &pulses_}) rhythm->pause_s = std::max(rhythm->pause_s, gap_s);
-  if (events_.samples >= kRhythmSamples && gap_s > std::max(kGapS, 5 * events_.period_s)) {
-    if (doubts_.time_m == 0) gap_begin_ns_ = stamp_ns_;
-    doubts_.time_m += std::abs(filter_.speed_mps()) * gap_s;
-  } else {
-    events_.period_s += (gap_s - events_.period_s) / std::min(++events_.samples, 50);
-  }
-}
-
-void Estimator::watch_standstill() {
-  const double distance_m = filter_.value(StateIndex::distance);
-  if (std::abs(distance_m - rest_distance_m_) > kRestM || filter_.sigma(StateIndex::speed) > kRestSpeedSigmaMps) {
-    rest_distance_m_ = distance_m;
-    rest_since_ns_ = stamp_ns_;
-  }
-  standstill_ = core::seconds(stamp_ns_ - rest_since_ns_) >= kRestS;
+  for (auto* rhythm : {&pictures_, &pulses_}) rhythm->pause(gap_s);
+  gap_.add(stamp_ns_, stamp_ns, filter_.speed_mps());
 }
 
 }  // namespace railfix::fusion

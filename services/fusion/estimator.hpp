@@ -12,61 +12,35 @@
 #include <vector>
 
 #include "core/repeated.hpp"
-#include "core/time.hpp"
 #include "fusion/felt_motion.hpp"
+#include "fusion/fix_outcome.hpp"
 #include "fusion/fusion_parameters.hpp"
 #include "fusion/fusion_types.hpp"
 #include "fusion/gyro_watch.hpp"
 #include "fusion/motion_filter.hpp"
 #include "fusion/odometer_scales.hpp"
+#include "fusion/other_ways.hpp"
+#include "fusion/period_mean.hpp"
+#include "fusion/rhythm.hpp"
+#include "fusion/sensor_watch.hpp"
 #include "fusion/slip_watch.hpp"
+#include "fusion/standstill.hpp"
 #include "fusion/sudden_change.hpp"
+#include "fusion/told_place.hpp"
 #include "fusion/track_doubt.hpp"
 #include "fusion/turned_way.hpp"
-#include "fusion/wheel_noise.hpp"
+#include "fusion/unwatched_way.hpp"
+#include "fusion/wheel_odometer.hpp"
 #include "fusion/wrong_place.hpp"
 #include "track/path.hpp"
 
 namespace railfix::fusion {
-
-/// What became of one sensor's measurements lately.
-struct SensorWatch {
-  int64_t seen_ns = 0;  // 0 = never
-  int64_t used_ns = 0;
-  int refused = 0;  // in a row
-  int agreed = 0;   // in a row, while it is isolated and only watched
-  bool isolated = false;
-  bool convicted = false;  // isolated because it is known to be the wrong one
-  int64_t changed_ns = 0;  // when it was isolated, or taken back
-
-  [[nodiscard]] bool isolated_without_proof() const { return isolated && !convicted; }
-  void accept(int64_t stamp_ns) {
-    used_ns = stamp_ns;
-    refused = 0;
-    if (isolated) changed_ns = stamp_ns;
-    isolated = convicted = false;
-  }
-  void isolate(int64_t stamp_ns) {
-    if (!isolated) changed_ns = stamp_ns;
-    isolated = true;
-    agreed = 0;
-  }
-  /// What an isolated sensor says next; one agreement may be chance, so many in a row bring it back.
-  void hear(bool agrees, int enough, int64_t stamp_ns) {
-    agreed = agrees ? agreed + 1 : 0;
-    if (agreed >= enough) accept(stamp_ns);
-  }
-};
 
 /// Where the train is for certain: the two ends on the path (on the distance run when the place is not known).
 struct Interval {
   double rear_m = 0;
   double front_m = 0;
 };
-
-/// Who has told the place, as long as nothing has confirmed it: the start is somebody's word, GNSS that agrees with it
-/// knows it to some 10 m only, and where it alone has told it, the train may be on the track beside.
-enum class ToldBy : uint8_t { nobody, start, start_and_gnss, gnss };
 
 /// What a fix must know of those beside whom it is used.
 struct FixContext {
@@ -125,7 +99,7 @@ class Estimator {
   /// From now on that sensor's samples do not come here; that it is isolated is no contradiction.
   void do_without(Source source) { watched(source).isolated = watched(source).convicted = false; }
   /// GNSS has agreed with the motion for a while, and with a place that it had not given itself.
-  [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof && place_.told_by != ToldBy::gnss; }
+  [[nodiscard]] bool gnss_proven() const { return gnss_agreed_ >= kGnssProof && place_.told.by() != ToldBy::gnss; }
   /// What GNSS that agrees with the motion may still be wrong by.
   [[nodiscard]] double gnss_bound_m() const;
   /// Takes over its place, with what is in doubt there, as independent knowledge; speed and scales stay its own.
@@ -142,22 +116,8 @@ class Estimator {
   /// ... and since the last one that was sharp enough for the budget to count from.
   [[nodiscard]] double since_reference_m() const { return std::abs(distance_m() - place_.reference_m); }
   /// What became of the last event, when it was a fix.
-  [[nodiscard]] bool fix_used() const { return fix_verdict_ == FixVerdict::used || fix_corrected(); }
-  /// Used against the filter's word, because the one before, which was refused, says the same.
-  [[nodiscard]] bool fix_corrected() const { return fix_verdict_ == FixVerdict::corrected; }
-  /// Of a landmark that was met before, since when little was forgotten: it says hardly anything new.
-  [[nodiscard]] bool fix_again() const { return fix_again_; }
-  [[nodiscard]] bool fix_refused() const { return fix_verdict_ == FixVerdict::refused; }
-  /// How far it was from where it was expected.
-  [[nodiscard]] double fix_residual_m() const { return fix_offer_.residual; }
-  /// How far beyond `excused_m` it was from where it was expected, in standard deviations.
-  [[nodiscard]] double fix_sigmas_off(double excused_m) const;
-  /// It was hardly to be believed where it was expected.
-  [[nodiscard]] bool fix_unexpected() const;
-  /// Nothing has confirmed yet the start that somebody has told.
-  [[nodiscard]] bool is_only_told() const { return place_.told_by == ToldBy::start; }
-  /// So many landmarks say that it is here, the first kLandmarksBelieved of them in a row.
-  [[nodiscard]] int landmarks_agreed() const { return place_.landmarks_agreed; }
+  [[nodiscard]] const FixOutcome& fix() const { return fix_; }
+  [[nodiscard]] int landmarks_agreed() const { return place_.told.landmarks_agreed(); }
 
   /// When the last event showed that the wheel slips: what it said since a little before is best taken back.
   [[nodiscard]] bool slip_began() const { return slip_began_; }
@@ -177,21 +137,9 @@ class Estimator {
   [[nodiscard]] std::optional<Against> given_up() const { return place_.given_up; }
 
  private:
-  /// Samples until they are used as their mean.
-  struct Mean {
-    int64_t since_ns = 0;
-    int64_t last_ns = 0;
-    double sum = 0;
-    int count = 0;
-    [[nodiscard]] bool begins(int64_t stamp_ns) const { return count == 0 || core::seconds(stamp_ns - last_ns) > 0.5; }
-    std::optional<double> add(int64_t stamp_ns, double value, double period_s);
-  };
   /// The wheel's odometer and its recovery from slip.
   struct Wheel {
-    std::optional<int64_t> first_pulses;
-    double last_m = 0;  // its reading
-    double resolution_m = 0;
-    bool scatters = false;
+    WheelOdometer odometer;
     std::vector<WheelBlock> blocks;
     int64_t counts_since_ns = 0;
     bool on_trial = false;  // had slipped, and was taken back in the dark on the word of an IMU alone
@@ -200,38 +148,9 @@ class Estimator {
     int good_windows = 0;
     bool camera_agrees = false;  // over the last second, and it turned
   };
-  /// Usual time between the samples of one odometer.
-  struct Rhythm {
-    double period_s = 0;
-    int samples = 0;
-    int off = 0;         // samples in a row that came out of it ...
-    double off_s = 0;    // ... and the time that they took
-    double pause_s = 0;  // the longest without a sample of any sensor since its last one
-  };
-  /// How far one reckoning is from another, and the furthest that came to on either side.
-  struct Apart {
-    double now_m = 0;
-    Sides most;
-    void add(double way_m) {
-      now_m += way_m;
-      most.hold({-now_m, now_m});
-    }
-  };
-  /// What the wheel has counted since the reference without a camera beside it.
-  struct Unwatched {
-    double distance_m = 0;  // of the train at its last sample
-    double way_m = 0;       // as far as nobody would have seen it slip
-    double hidden_m = 0;    // what slips may have added that pass for a change of speed
-    double fastest_mps = 0;
-    Apart counted{};  // its way less the train's while it was isolated: who is wrong is not known for certain
-    Apart refused{};  // steps of a camera that nobody else speaks for, which were refused one by one
-    Apart felt{};     // what an IMU feels that the wheel does not say
-  };
   static constexpr int kGnssProof = 30;
-  static constexpr int kRefusalsToIsolate = 3;  // in a row
   static constexpr double kLatelyS = 1.0;
   static constexpr double kBlindS = 0.3;  // the camera
-  enum class FixVerdict : uint8_t { none, used, corrected, refused };
   struct RefusedFix {
     double residual_m = 0;
     double sigma_m = 0;
@@ -241,9 +160,7 @@ class Estimator {
   struct Place {
     std::shared_ptr<const track::Path> path;  // nullptr = the place is not known
     std::optional<Against> given_up;          // the last place was, and there is none since
-    ToldBy told_by = ToldBy::nobody;
-    int bends_agreed = 0;       // curves that fitted a place that was only told
-    bool alike_beside = false;  // what has agreed with it agrees with a track beside it as well
+    ToldPlace told;
     TrackDoubt track_doubt;
     TurnedWay turned_way;
     WrongPlace wrong_place;
@@ -251,17 +168,11 @@ class Estimator {
     double fix_m = 0;                // the distance run at the last fix that settled what was in doubt ...
     double reference_m = 0;          // ... and at the reference
     std::array<uint32_t, 16> met{};  // landmarks that were used last, newest first; 0 = none
-    int landmarks_agreed = 0;        // as landmarks_agreed()
-    // Until a landmark or a curve tells them apart: over other ways that lead to tracks that were declared, or that
-    // map_matcher has named, and as far as it now says another place without naming one.
-    Sides joined;
-    Sides other_ways;
-    Sides said_elsewhere;
+    OtherWays other_ways;
   };
   /// What is in doubt until a fix is used.
   struct Doubts {
     double odometers_m = 0;  // camera and the rest contradict each other by so much
-    double time_m = 0;       // so far behind: time without data may be no time but a clock that was set
     Sides gnss;              // GNSS that contradicts a wheel alone says that the train is so far away
     Sides refused;           // a fix that was refused, or a surprising one, says that the train is so far away
   };
@@ -294,7 +205,6 @@ class Estimator {
   [[nodiscard]] bool slipped_unseen() const;
   [[nodiscard]] bool wheel_is_alone() const;
   [[nodiscard]] double unwatched_share() const;
-  double speed_changed_alone_mps();
   void restart_wheel(int64_t stamp_ns, double wheel_m, double sigma_m);
   void take_wheel_back(int64_t stamp_ns, double wheel_m, double sigma_m);
   void recover_wheel(const WheelInput& sample, double wheel_m, double sigma_m);
@@ -303,11 +213,6 @@ class Estimator {
   bool judge_gyro(double rate_rps);
   void remember_turn(double rate_rps, double speed_mps);
   void compare_turns();
-  /// What agrees with the place says whether it is the right track, too.
-  [[nodiscard]] bool confirms_start(bool tells_track);
-  void disagrees(const FixInput& fix);
-  void confirm_by(const FixInput& landmark);
-  void confirm_by_curve(bool tells_track);
   /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies_place() const;
   /// That end of its path.
@@ -316,12 +221,6 @@ class Estimator {
   void hold_gnss(double foot_m, double sigma_m);
   void use_track(const FixInput& fix);
   void doubt_points_behind();
-  /// Other ways that the train may have come over, to either side.
-  [[nodiscard]] Sides named_ways() const;
-  /// ... with what map_matcher says otherwise and does not name.
-  [[nodiscard]] Sides held_ways() const;
-  [[nodiscard]] bool tells_ways_apart(const FixInput& fix) const;
-  void hold_other_ways(const FixInput& fix, double place_m, double here_m);
   [[nodiscard]] bool fits_a_named_way(const MeasuredPlace& place) const;
   Offer offer_place(const MeasuredPlace& place);
   Offer offer_place_again(double path_distance_m, double sigma_m);
@@ -338,7 +237,6 @@ class Estimator {
   void refuse(const FixInput& fix, double path_distance_m, const Offer& offer);
   void accept(const FixInput& fix);
   void mark_reference(const FixInput& fix);
-  void watch_standstill();
   SensorWatch& watched(Source source) { return watches_[static_cast<size_t>(source)]; }
   [[nodiscard]] bool silent(Source source) const;
   [[nodiscard]] double unused_for_s(Source source) const;
@@ -348,8 +246,6 @@ class Estimator {
   void judge_bounds(TrainEstimate& estimate) const;
   void locate(TrainEstimate& estimate) const;
 
-  static constexpr int kLandmarksBelieved = 5;  // in a row, whoever says otherwise
-
   const FusionParameters* parameters_;
   MotionFilter filter_;
   int64_t stamp_ns_;
@@ -357,32 +253,26 @@ class Estimator {
 
   // Motion, and who is believed about it.
   std::array<SensorWatch, kSources> watches_;
-  Rhythm events_;
   Rhythm pictures_;
   Rhythm pulses_;
-  int64_t gap_begin_ns_ = 0;
-  Mean accel_;
+  DataGap gap_;
+  PeriodMean accel_;
   core::Repeated accel_repeated_;
   bool grade_known_ = true;
   double graded_m_ = 0;  // the distance up to which the bias allows for a grade that is not known
-  Mean yaw_;
+  PeriodMean yaw_;
   GyroWatch gyro_watch_;
   double judged_m_ = 0;  // the distance at which its mean began
   Wheel wheel_;
-  WheelNoise wheel_noise_;
   FeltMotion felt_;
   SlipWatch slip_watch_;
   SuddenChange sudden_change_;
   bool slip_began_ = false;
-  double rest_distance_m_ = 0;
-  int64_t rest_since_ns_ = 0;
-  bool standstill_ = false;
+  Standstill standstill_;
 
   // The place, and the fixes that told it.
   Place place_;
-  FixVerdict fix_verdict_ = FixVerdict::none;
-  Offer fix_offer_;  // of the last fix
-  bool fix_again_ = false;
+  FixOutcome fix_;  // of the last event
   std::optional<RefusedFix> refused_fix_;
   std::optional<track::EdgePosition> off_path_;  // a fix was there since the last one that was used
   bool corrected_ = false;                       // the place was moved against the filter's word, not confirmed yet
@@ -391,9 +281,7 @@ class Estimator {
 
   // What the interval holds beyond the filter's sigma.
   Doubts doubts_;
-  Unwatched unwatched_;
-  double alone_slowest_mps_ = 0;  // that the wheel has said since it measures alone
-  double alone_fastest_mps_ = 0;
+  UnwatchedWay unwatched_;
   double unchecked_m_ = 0;  // of the first step, until a second one or the wheel agrees
   FixContext context_;      // of the present event
 };

@@ -85,11 +85,7 @@ void Estimator::use(const GnssInput& sample) {
   } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
     gnss.accept(sample.stamp_ns);
     ++gnss_agreed_;
-    if (confirms_start(sample.tells_track)) {
-      // A single fix errs by metres that last, however low its HDOP is.
-      const bool is_sharp = is_rtk(sample) && once_m <= kSharpGnssM;
-      place_.told_by = is_sharp ? ToldBy::nobody : ToldBy::start_and_gnss;
-    }
+    place_.told.gnss_agrees(sample.tells_track, is_rtk(sample) && once_m <= kSharpGnssM);
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
     if (gnss_proven()) place_.wrong_place.found();
   } else if (++gnss.refused >= kRefusalsToIsolate) {

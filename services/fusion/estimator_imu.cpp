@@ -20,17 +20,6 @@ constexpr double kTurnSigmasOfTwo = 2.0;  // without the worst second
 
 }  // namespace
 
-std::optional<double> Estimator::Mean::add(int64_t stamp_ns, double value, double period_s) {
-  if (begins(stamp_ns)) *this = {stamp_ns, stamp_ns, 0, 0};
-  last_ns = stamp_ns;
-  sum += value;
-  ++count;
-  if (core::seconds(stamp_ns - since_ns) < period_s) return std::nullopt;
-  const double mean = sum / count;
-  *this = {};
-  return mean;
-}
-
 void Estimator::use(const ImuInput& sample) {
   auto& imu = watched(Source::imu);
   imu.seen_ns = sample.stamp_ns;
@@ -108,7 +97,7 @@ void Estimator::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
   } else {
     felt_.pause();
   }
-  unwatched_.felt.add(felt_.faster_mps() * dt_s);
+  unwatched_.feel(felt_.faster_mps() * dt_s);
 }
 
 // The mean belongs to the middle of its period, which lies v * period / 2 behind.
@@ -119,7 +108,7 @@ void Estimator::use_yaw_rate(double rate_rps) {
     place_.turned_way.clear();
     return;
   }
-  if (standstill_) {
+  if (standstill_.stands()) {
     filter_.offer_yaw_rate(rate_rps, 0, 0, parameters_->gyro_sigma_rps, parameters_->gate_gyro);
     return;
   }
@@ -144,7 +133,7 @@ bool Estimator::judge_gyro(double rate_rps) {
   const double period_s = parameters_->gyro_period_s;
   const double way_m = distance_m() - judged_m_;
   GyroWatch::Turned turned{period_s, way_m, rate_rps * period_s, parameters_->gyro_sigma_rps * period_s};
-  if (standstill_) {
+  if (standstill_.stands()) {
     gyro_watch_.rest(turned);
     return gyro_watch_.fault() == GyroWatch::Fault::none || gyro_watch_.fault() == GyroWatch::Fault::contradicted;
   }

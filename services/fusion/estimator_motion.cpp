@@ -19,14 +19,11 @@ constexpr double kSlipWindowS = 0.5;
 constexpr int kGoodWindows = 2;
 constexpr double kSlipTestSigmas = 3.0;
 constexpr double kSlipSigmas = 4.5;
-constexpr double kScatterResolutions = 3.0;
 constexpr double kSilentS = 1.0;
 constexpr double kSilentSlip = 0.1;  // share of the way
 constexpr double kTeachesS = 10.0;
 constexpr double kTaughtS = 30.0;
 constexpr double kSleeperM = 0.7;  // one more or less: the odd error of a step
-constexpr double kHiddenSlipMps = 0.7;
-constexpr double kHiddenSlipShare = 0.07;  // of the speed
 constexpr double kUnseenBiasSigmas = 4.0;
 constexpr double kMisledSpeedMps = 10.0;  // one sigma of a speed that a wheel found wrong had told
 
@@ -77,12 +74,12 @@ void Estimator::use(const OdometryInput& step) {
       unchecked_m_ = is_first ? kSleeperM : 0;
       if (is_first) filter_.doubt_first_speed(Odometer::camera, dt_s);
       camera.accept(step.stamp_ns);
-      if (step.reference_stamp_ns <= gap_begin_ns_ && filter_.has_clone(step.reference_stamp_ns)) doubts_.time_m = 0;
+      if (filter_.has_clone(step.reference_stamp_ns)) gap_.counted_since(step.reference_stamp_ns);
       compare_with_wheel(step, sigma_m);
     } else {
       slip_watch_.no_picture();
       // One that is refused now and then always says the same where the film has pictures twice.
-      if (alone) unwatched_.refused.add(offer.residual);
+      if (alone) unwatched_.refuse_step(offer.residual);
       if (++camera.refused >= kRefusalsToIsolate && !blame_wheel_on_trial()) {
         if (alone && !camera.isolated) doubts_.odometers_m += camera.refused * std::abs(offer.residual);
         camera.isolate(step.stamp_ns);
@@ -108,7 +105,7 @@ void Estimator::compare_with_wheel(const OdometryInput& step, double sigma_m) {
   if (!ways) return;
   const double visual_m = ways->visual_m * filter_.to_unit(Odometer::camera);
   const double wheel_m = ways->wheel_m * filter_.to_unit(Odometer::wheel);
-  const double noise_m = std::hypot(sigma_m * std::sqrt(ways->steps), wheel_.resolution_m);
+  const double noise_m = std::hypot(sigma_m * std::sqrt(ways->steps), wheel_.odometer.resolution_m());
   const double known_m = filter_.sigma(StateIndex::other_scale) * std::abs(visual_m);
   const double raw_m = std::hypot(parameters_->visual_scale_sigma, parameters_->wheel_scale_sigma) * std::abs(visual_m);
   const bool ratio_moved = std::abs(wheel_m - visual_m) > kSlipSigmas * std::hypot(noise_m, known_m);
@@ -147,78 +144,54 @@ void Estimator::use(const WheelInput& sample) {
   auto& watch = watched(Source::wheel);
   if (!watch.isolated) doubt_time(watch, pulses_, sample.stamp_ns);
   const int64_t before_ns = std::exchange(watch.seen_ns, sample.stamp_ns);
-  const bool first = !wheel_.first_pulses;
-  if (first) wheel_.first_pulses = sample.pulses;
-  const double wheel_m = static_cast<double>(sample.pulses - *wheel_.first_pulses) / sample.pulses_per_metre;
-  const double way_m = first ? 0.0 : wheel_m - std::exchange(wheel_.last_m, wheel_m);
-  wheel_noise_.add(sample.stamp_ns, wheel_m);
-  const double resolution_sigma_m = std::hypot(1 / sample.pulses_per_metre / std::sqrt(12.0), 0.001);
-  wheel_.scatters = wheel_noise_.sigma_m() > kScatterResolutions * resolution_sigma_m;
-  const double sigma_m = wheel_.scatters ? wheel_noise_.sigma_m() : resolution_sigma_m;
-  wheel_.resolution_m = wheel_.scatters ? sigma_m * std::sqrt(2.0) : 1 / sample.pulses_per_metre;
+  const auto reading = wheel_.odometer.read(sample);
+  const double wheel_m = reading.odometer_m;
   slip_watch_.wheel(sample.stamp_ns, wheel_m);
-  doubt_silent_wheel(before_ns, way_m);
+  doubt_silent_wheel(before_ns, reading.way_m);
   std::erase_if(wheel_.blocks, [&](const WheelBlock& block) { return block.until_ns < sample.stamp_ns; });
   if (std::ranges::any_of(wheel_.blocks, [&](const WheelBlock& b) { return b.from_ns < sample.stamp_ns; })) {
     isolate_wheel();
     slip_began_ = false;
   }
-  if (first) {
+  if (reading.is_first) {
     if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::wheel);
-    restart_wheel(sample.stamp_ns, wheel_m, sigma_m);
+    restart_wheel(sample.stamp_ns, wheel_m, reading.sigma_m);
   } else if (watch.isolated) {
-    recover_wheel(sample, wheel_m, sigma_m);
+    recover_wheel(sample, wheel_m, reading.sigma_m);
   } else if (offer_motion(Source::wheel, sample.stamp_ns, [&](MotionFilter& filter) {
-               return filter.offer_wheel(wheel_m, sigma_m, parameters_->gate_wheel);
+               return filter.offer_wheel(reading.odometer_m, reading.sigma_m, parameters_->gate_wheel);
              }).used) {
     if (nobody_measured()) filter_.doubt_first_speed(Odometer::wheel, core::seconds(sample.stamp_ns - before_ns));
     watch.accept(sample.stamp_ns);
     unchecked_m_ = 0;
-    if (wheel_.counts_since_ns <= gap_begin_ns_) doubts_.time_m = 0;
+    gap_.counted_since(wheel_.counts_since_ns);
   } else if (++watch.refused >= kRefusalsToIsolate) {
     isolate_wheel();
   }
-  watch_alone(way_m, before_ns == 0 ? 0.0 : core::seconds(sample.stamp_ns - before_ns));
+  watch_alone(reading.way_m, before_ns == 0 ? 0.0 : core::seconds(sample.stamp_ns - before_ns));
 }
 
 // What it counted while it was silent may have a slip in it. When every sensor was silent it is the clock that is
 // asked.
 void Estimator::doubt_silent_wheel(int64_t silent_since_ns, double way_m) {
-  if (silent_since_ns == 0 || core::seconds(stamp_ns_ - silent_since_ns) < std::max(kSilentS, 5 * pulses_.period_s))
+  if (silent_since_ns == 0 || core::seconds(stamp_ns_ - silent_since_ns) < std::max(kSilentS, 5 * pulses_.period_s()))
     return;
-  if (gap_begin_ns_ >= silent_since_ns) return;
+  if (gap_.begin_ns() >= silent_since_ns) return;
   filter_.doubt_wheel(kSilentSlip * std::abs(way_m));
 }
 
-// A slip that begins slowly takes the filter along, and when it ends it is the wheel that seems to slip.
 void Estimator::watch_alone(double way_m, double dt_s) {
-  const double run_m = filter_.value(StateIndex::distance) - unwatched_.distance_m;
-  unwatched_.distance_m += run_m;
-  if (watch(Source::wheel).isolated && !is_watched())
-    unwatched_.counted.add(filter_.scale(Odometer::wheel) * way_m - run_m);
-  // Nobody else measures for a while, or the wheel came back in the dark, where an IMU alone had said that it is well
-  // again: a slip may be no larger than what passes for a change of speed.
-  const bool came_back = slipped_unseen() && !sees();
-  const double alone_mps = speed_changed_alone_mps();
-  if (is_watched() && (wheel_is_alone() || came_back)) {
-    const double passes_mps = std::max(kHiddenSlipMps, kHiddenSlipShare * std::abs(filter_.speed_mps()));
-    const double hidden_mps = std::max(passes_mps, alone_mps);
-    const double more_m = std::min(hidden_mps * dt_s, parameters_->wheel_slip_share * std::abs(way_m));
-    const double most_m = std::max(unwatched_.hidden_m, hidden_mps * parameters_->wheel_slip_s);
-    unwatched_.hidden_m = std::min(unwatched_.hidden_m + more_m, most_m);
-  }
-  const double share = unwatched_share();
-  unwatched_.way_m += share * std::max(std::abs(way_m), std::abs(run_m));
-  unwatched_.fastest_mps = std::max(unwatched_.fastest_mps, share * std::abs(filter_.speed_mps()));
-}
-
-// So much a slip may have changed the speed that a wheel alone says: as a train accelerates or brakes, for as long.
-double Estimator::speed_changed_alone_mps() {
-  const double now_mps = std::abs(filter_.speed_mps());
-  if (!wheel_is_alone()) alone_slowest_mps_ = alone_fastest_mps_ = now_mps;
-  alone_slowest_mps_ = std::min(alone_slowest_mps_, now_mps);
-  alone_fastest_mps_ = std::max(alone_fastest_mps_, now_mps);
-  return std::min(alone_fastest_mps_ - alone_slowest_mps_, parameters_->wheel_slip_share * alone_fastest_mps_);
+  unwatched_.count({.way_m = way_m,
+                    .scale = filter_.scale(Odometer::wheel),
+                    .time_s = dt_s,
+                    .distance_m = distance_m(),
+                    .speed_mps = filter_.speed_mps(),
+                    .unseen_share = unwatched_share(),
+                    .isolated = watch(Source::wheel).isolated,
+                    .watched = is_watched(),
+                    .alone = wheel_is_alone(),
+                    .came_back = slipped_unseen() && !sees()},
+                   *parameters_);
 }
 
 bool Estimator::wheel_is_alone() const {

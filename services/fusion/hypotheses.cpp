@@ -83,9 +83,9 @@ void Hypotheses::apply_fix(const Event& event) {
   Estimator before = main_;
   const Sides most = most_excess();
   main_.apply(event, {.excess_m = std::max(most.behind_m, most.ahead_m)});
-  const bool judged = main_.fix_used() || main_.fix_refused();
-  if (judged && fix.kind == FixKind::landmark && !main_.fix_again())
-    residuals_.add(fix.landmark, main_.fix_residual_m(), main_.fix_sigmas_off(0), before.since_fix_m());
+  const bool judged = main_.fix().used() || main_.fix().refused();
+  if (judged && fix.kind == FixKind::landmark && !main_.fix().again)
+    residuals_.add(fix.landmark, main_.fix().offer.residual, main_.fix().sigmas_off(), before.since_fix_m());
   std::vector<Doubter> doubters_before = doubters_;
   for (auto& doubter : doubters_) {
     if (!doubter.leaves_out(fix)) doubter.estimator.apply(event);
@@ -93,14 +93,14 @@ void Hypotheses::apply_fix(const Event& event) {
   for (auto& rival : rivals_) {
     if (rival.estimator) rival.estimator->apply(event, {.unwidened = true});
   }
-  if (judged) fix_fitted_ = main_.fix_used() && !main_.fix_corrected();
-  if (main_.fix_refused()) {
+  if (judged) fix_fitted_ = main_.fix().used() && !main_.fix().corrected();
+  if (main_.fix().refused()) {
     if (adopt_by_fix(fix, before, doubters_before) || !adopt_doubter(fix, std::move(doubters_before))) return;
-  } else if (main_.fix_used()) {
+  } else if (main_.fix().used()) {
     auto without = without_two(fix, doubters_before);
     without.push_back(without_one(fix, std::move(before), most));
     const auto leaves_out = [&](const Doubter& doubter) { return doubter.leaves_out(fix); };
-    if (!main_.fix_again() && std::ranges::none_of(doubters_, leaves_out)) {
+    if (!main_.fix().again && std::ranges::none_of(doubters_, leaves_out)) {
       settle_doubters(fix, doubters_before);
       if (!fix.new_path) std::ranges::move(without, std::back_inserter(doubters_));
     }
@@ -131,11 +131,11 @@ Hypotheses::Doubter Hypotheses::without_one(const FixInput& fix, Estimator befor
   Doubter doubter{.estimator = std::move(before), .landmark = fix.landmark, .of_shape = fix.kind == FixKind::curvature};
   const Interval slip = doubter.estimator.widened({});
   doubter.excused_m = std::max({most.behind_m, most.ahead_m, -slip.rear_m, slip.front_m});
-  doubter.surprising = doubter.of_shape && main_.fix_unexpected();
+  doubter.surprising = doubter.of_shape && main_.fix().unexpected();
   doubter.confirmed_by = doubter.estimator.landmarks_agreed();
   // A false fix beside a sensor that is wrong settles nothing of what the rivals held.
   if (doubter.estimator.disputes(kMotionSources)) doubter.estimator.doubt_place(most);
-  doubter.against = main_.fix_corrected() ? kFixesOfAClaim : 1;
+  doubter.against = main_.fix().corrected() ? kFixesOfAClaim : 1;
   return doubter;
 }
 
@@ -168,13 +168,13 @@ void Hypotheses::settle_doubters(const FixInput& fix, const std::vector<Doubter>
 // odometers cannot be so far off, and no single one of them either, landmarks may be wrong alike: it does without them
 // until they are too many for that, or GNSS speaks against it.
 bool Hypotheses::settle(Doubter& doubter, const Estimator& before, const FixInput& fix) const {
-  const bool contradicted = doubter.estimator.fix_refused() || doubter.estimator.fix_corrected();
+  const bool contradicted = doubter.estimator.fix().refused() || doubter.estimator.fix().corrected();
   const bool of_shape = fix.kind == FixKind::curvature;
   if (doubter.of_shape) return of_shape || contradicted;
   if (of_shape && !contradicted) return false;
   const bool enough = contradicted || (++doubter.agreed >= kFixesToSettle && !differs_in_scale(doubter));
-  if (doubter.estimator.fix_sigmas_off(0) < kUnlikelySigmas) return enough;
-  const double sigmas = doubter.estimator.fix_sigmas_off(doubter.excused_m);
+  if (doubter.estimator.fix().sigmas_off() < kUnlikelySigmas) return enough;
+  const double sigmas = doubter.estimator.fix().sigmas_off(doubter.excused_m);
   const bool gnss_denies = before.watch(Source::gnss).isolated && !main_.watch(Source::gnss).isolated;
   doubter.estimator = before;
   doubter.against += of_shape ? 0 : 1;
@@ -196,7 +196,7 @@ bool Hypotheses::differs_in_scale(const Doubter& doubter) const {
 bool Hypotheses::adopt_by_fix(const FixInput& fix, const Estimator& before, const std::vector<Doubter>& doubters) {
   Rival* only = nullptr;
   for (auto& rival : rivals_) {
-    if (!rival.asked || !rival.estimator->fix_used()) continue;
+    if (!rival.asked || !rival.estimator->fix().used()) continue;
     if (only != nullptr) return false;
     only = &rival;
   }

@@ -72,7 +72,7 @@ class Hypotheses {
     int confirmed_by = 0;     // landmarks before that fix
     int against = 0;          // that fix and later ones that the main one alone fits
 
-    [[nodiscard]] bool fits() const { return estimator.fix_used() && !estimator.fix_corrected(); }
+    [[nodiscard]] bool fits() const { return estimator.fix().used() && !estimator.fix().corrected(); }
     [[nodiscard]] bool leaves_out(const FixInput& fix) const {
       return surprising ? fix.kind == FixKind::curvature : landmark != 0 && landmark == fix.landmark;
     }

@@ -71,7 +71,7 @@ void Hypotheses::confirm_rivals() {
   for (auto& rival : rivals_) {
     rival.forget_excess();
     // Confirmed is the main one: a rival that is elsewhere was wrong.
-    if (!rival.estimator || !rival.estimator->fix_refused()) continue;
+    if (!rival.estimator || !rival.estimator->fix().refused()) continue;
     if (stands_for_another(rival)) {
       rival.estimator->place_like(main_);
     } else {

@@ -1,0 +1,52 @@
+#include "fusion/told_place.hpp"
+
+namespace railfix::fusion {
+namespace {
+
+constexpr int kCurvesConfirm = 3;  // a place that was only told
+
+}  // namespace
+
+void ToldPlace::agrees(const FixInput& landmark) {
+  ++landmarks_agreed_;
+  confirm_by(landmark);
+}
+
+// Once so many in a row have agreed they are believed, whatever one says later.
+void ToldPlace::disagrees(const FixInput& fix) {
+  if (fix.kind == FixKind::landmark && !believed()) landmarks_agreed_ = 0;
+}
+
+void ToldPlace::moved_to(const FixInput& fix) {
+  landmarks_agreed_ = fix.kind == FixKind::landmark ? 2 : 0;
+  if (fix.kind == FixKind::landmark) confirm_by(fix);
+}
+
+// What agrees with the place says whether it is the right track, too.
+bool ToldPlace::confirms_start(bool tells_track) {
+  if (!is_only_told()) return false;
+  alike_beside_ = alike_beside_ || !tells_track;
+  return tells_track;
+}
+
+// Where masts stand everywhere some stand by chance where the map has them: map_matcher knows how many; GNSS is never
+// so far off.
+void ToldPlace::confirm_by(const FixInput& landmark) {
+  if (is_only_told() && !confirms_start(landmark.tells_track)) return;
+  const bool confirms = landmark.sightings_fit == SightingsFit::here || believed();
+  if (!is_only_told() || confirms) confirm();
+}
+
+// One may fit by chance, and there is none on a straight line that lies elsewhere.
+void ToldPlace::curve_agrees(bool tells_track, bool turns_otherwise) {
+  if (by_ != ToldBy::start_and_gnss && !confirms_start(tells_track)) return;
+  bends_agreed_ = turns_otherwise ? 0 : bends_agreed_ + 1;
+  if (bends_agreed_ >= kCurvesConfirm) confirm();
+}
+
+// A single fix errs by metres that last, however low its HDOP is.
+void ToldPlace::gnss_agrees(bool tells_track, bool is_sharp) {
+  if (confirms_start(tells_track)) by_ = is_sharp ? ToldBy::nobody : ToldBy::start_and_gnss;
+}
+
+}  // namespace railfix::fusion

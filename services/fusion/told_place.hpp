@@ -1,0 +1,54 @@
+// Who has told the place on the map, and what has confirmed it since. A start is somebody's word, GNSS that agrees with
+// it knows it to some 10 m only, and where GNSS alone has told it, the train may be on the track beside.
+#pragma once
+
+#include <cstdint>
+
+#include "fusion/fusion_types.hpp"
+
+namespace railfix::fusion {
+
+/// As long as nothing has confirmed it.
+enum class ToldBy : uint8_t { nobody, start, start_and_gnss, gnss };
+
+/// A plain value.
+class ToldPlace {
+ public:
+  void tell(ToldBy by) {
+    by_ = by;
+    bends_agreed_ = 0;
+  }
+  void confirm() { by_ = ToldBy::nobody; }
+  /// A landmark agrees with it ...
+  void agrees(const FixInput& landmark);
+  /// ... or any fix does not.
+  void disagrees(const FixInput& fix);
+  /// A second fix in a row says this other place, to which the train was moved.
+  void moved_to(const FixInput& fix);
+  /// The track bends here as it should.
+  void curve_agrees(bool tells_track, bool turns_otherwise);
+  void gnss_agrees(bool tells_track, bool is_sharp);
+
+  [[nodiscard]] ToldBy by() const { return by_; }
+  /// Nothing has confirmed yet the start that somebody has told.
+  [[nodiscard]] bool is_only_told() const { return by_ == ToldBy::start; }
+  /// What has agreed with it agrees with a track beside it as well.
+  [[nodiscard]] bool alike_beside() const { return alike_beside_; }
+  /// So many landmarks say that it is here, the first kLandmarksBelieved of them in a row.
+  [[nodiscard]] int landmarks_agreed() const { return landmarks_agreed_; }
+  /// Enough of them, whoever says otherwise. Where masts stand everywhere, some are sighted by chance where the map has
+  /// one.
+  [[nodiscard]] bool believed() const { return landmarks_agreed_ >= kLandmarksBelieved; }
+
+ private:
+  static constexpr int kLandmarksBelieved = 5;
+  [[nodiscard]] bool confirms_start(bool tells_track);
+  void confirm_by(const FixInput& landmark);
+
+  ToldBy by_ = ToldBy::nobody;
+  int bends_agreed_ = 0;  // curves that fitted a place that was only told
+  bool alike_beside_ = false;
+  int landmarks_agreed_ = 0;
+};
+
+}  // namespace railfix::fusion
