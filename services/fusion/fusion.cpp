@@ -160,7 +160,8 @@ std::optional<TrainEstimate> Fusion::use(Event event) {
 std::optional<TrainEstimate> Fusion::tick(int64_t now_ns) {
   if (!now_) return std::nullopt;
   // Before an odometer has measured there is nothing to go on with, and its first measurements may be late.
-  const bool moved = std::ranges::any_of(kOdometers, [&](Source one) { return now_->main().has_ever_measured(one); });
+  const bool moved =
+      std::ranges::any_of(kOdometers, [&](Source one) { return now_->main().sensors().has_ever_measured(one); });
   const double patience_s = moved ? parameters_->output_period_s : parameters_->sensor_timeout_s;
   if (core::seconds(now_ns - last_output_ns_) < patience_s) return std::nullopt;
   if (now_ns <= now_->stamp_ns()) return std::nullopt;
@@ -182,7 +183,7 @@ const Estimator* Fusion::estimator() {
 
 void Fusion::start_position(FixInput& fix) const {
   const bool of_begin = fix.kind == FixKind::network || fix.kind == FixKind::gnss;
-  if (now_->main().path() || !map_ || !of_begin || fix.probability < kBeginProbability) return;
+  if (now_->main().place().path() || !map_ || !of_begin || fix.probability < kBeginProbability) return;
   auto path = track::Path::follow(map_, {fix.edge, fix.offset_m, fix.direction}, kPathAheadM, kPathBehindM);
   if (path.ok()) fix.new_path = std::make_shared<const track::Path>(std::move(path).value());
 }
@@ -207,7 +208,7 @@ void Fusion::look_beside(Event& event) {
 // where several lead there the place may be another by what their lengths differ. False: that track is not beside the
 // train, but elsewhere on its way or on the map, and who says so is lost.
 bool Fusion::change_track(FixInput& fix) {
-  const auto& path = now_->main().path();
+  const auto& path = now_->main().place().path();
   if (fix.kind != FixKind::track || !path) return true;
   if (map_->edge(fix.edge) == nullptr) return false;
   const auto& filter = now_->main().filter();
@@ -239,7 +240,7 @@ bool Fusion::change_track(FixInput& fix) {
 // A train may run further than the path was followed at the start, backwards as well. What is behind and below it
 // stays.
 void Fusion::follow_path_on() {
-  const auto path = now_->main().path();
+  const auto path = now_->main().place().path();
   if (!path) return;
   const double here_m = now_->main().filter().path_distance_m();
   if (std::min(path->end_m() - here_m, here_m - path->begin_m()) > kPathLeftM) return;
@@ -259,7 +260,7 @@ void Fusion::follow_path_on() {
 void Fusion::anchor(OdometryInput& step) {
   const auto knows = [&](int64_t picture_ns) {
     return picture_ns < step.stamp_ns &&
-           (now_->main().knows_picture(picture_ns) || picture_ns > snapshots_.front().stamp_ns());
+           (now_->main().filter().has_clone(picture_ns) || picture_ns > snapshots_.front().stamp_ns());
   };
   if (!step.valid || knows(step.reference_stamp_ns)) return;
   if (anchor_ && anchor_->reference_stamp_ns == step.reference_stamp_ns && knows(anchor_->stamp_ns)) {
@@ -274,7 +275,7 @@ void Fusion::anchor(OdometryInput& step) {
 }
 
 void Fusion::remember_reference(const OdometryInput& step) {
-  if (!step.valid || now_->main().knows_picture(step.reference_stamp_ns)) return;
+  if (!step.valid || now_->main().filter().has_clone(step.reference_stamp_ns)) return;
   if (step.reference_stamp_ns > snapshots_.front().stamp_ns()) insert(PictureInput{step.reference_stamp_ns});
 }
 

@@ -105,7 +105,7 @@ std::optional<double> Fusion::time_since_counted(const std::vector<Event>& held)
     const auto* step = std::get_if<OdometryInput>(&event);
     if (wheel && last_wheel_ && !main.watch(Source::wheel).isolated) {
       way_m = static_cast<double>(wheel->pulses - last_wheel_->pulses) / wheel->pulses_per_metre;
-    } else if (step && step->valid && main.knows_picture(step->reference_stamp_ns)) {
+    } else if (step && step->valid && main.filter().has_clone(step->reference_stamp_ns)) {
       way_m = step->step_m;
     }
     if (way_m) break;

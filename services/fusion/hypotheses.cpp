@@ -51,7 +51,7 @@ void Hypotheses::apply(const Event& event) {
   } else {
     apply_to_all(event);
   }
-  if (const auto against = main_.place_is_wrong()) give_place_up(*against);
+  if (const auto against = main_.place().wrong_place().proven()) give_place_up(*against);
 }
 
 void Hypotheses::apply_to_all(const Event& event) {
@@ -62,7 +62,7 @@ void Hypotheses::apply_to_all(const Event& event) {
   for (auto& rival : rivals_) {
     if (rival.estimator && rival.without != source) rival.estimator->apply(event);
   }
-  if (source == Source::camera || source == Source::wheel || (source == Source::imu && main_.in_the_dark())) {
+  if (source == Source::camera || source == Source::wheel || (source == Source::imu && main_.sensors().in_the_dark())) {
     exclude_faulty();
     ask_rivals();
   }
@@ -132,9 +132,9 @@ Hypotheses::Doubter Hypotheses::without_one(const FixInput& fix, Estimator befor
   const Interval slip = doubter.estimator.widened({});
   doubter.excused_m = std::max({most.behind_m, most.ahead_m, -slip.rear_m, slip.front_m});
   doubter.surprising = doubter.of_shape && main_.fix().unexpected();
-  doubter.confirmed_by = doubter.estimator.landmarks_agreed();
+  doubter.confirmed_by = doubter.estimator.place().told().landmarks_agreed();
   // A false fix beside a sensor that is wrong settles nothing of what the rivals held.
-  if (doubter.estimator.disputes(kMotionSources)) doubter.estimator.doubt_place(most);
+  if (doubter.estimator.sensors().dispute(kMotionSources)) doubter.estimator.doubt_place(most);
   doubter.against = main_.fix().corrected() ? kFixesOfAClaim : 1;
   return doubter;
 }

@@ -25,18 +25,19 @@ void Hypotheses::exclude_faulty() {
   int consistent = 0;
   for (auto& rival : rivals_) {
     if (!rival.estimator || rival.without == Source::gnss) continue;
-    const bool agrees = rival.estimator->is_consistent();
+    const bool agrees = rival.estimator->sensors().are_consistent();
     consistent += agrees ? 1 : 0;
-    const bool proves = agrees && rival.estimator->sensors_at_work() >= 2 && !rival.estimator->feels_otherwise();
+    const bool proves =
+        agrees && rival.estimator->sensors().at_work() >= 2 && !rival.estimator->motion().feels_otherwise();
     if (!proves || rival.proven_since_ns == 0) rival.proven_since_ns = proves ? now_ns : 0;
     if (proves && core::seconds(now_ns - rival.proven_since_ns) >= kProofS) proven = &rival;
   }
-  if (proven == nullptr || consistent > 1 || main_.is_consistent()) return;
+  if (proven == nullptr || consistent > 1 || main_.sensors().are_consistent()) return;
   // Nothing is left to prove when that sensor alone is isolated.
-  if (main_.is_consistent(1U << static_cast<unsigned>(proven->without))) return;
+  if (main_.sensors().are_consistent(1U << static_cast<unsigned>(proven->without))) return;
   Estimator next = without_faulty(*proven);
   for (auto& doubter : doubters_) {
-    if (!doubter.estimator.is_consistent()) take_along(doubter, next);
+    if (!doubter.estimator.sensors().are_consistent()) take_along(doubter, next);
   }
   adopt(*proven, std::move(next));
 }
@@ -86,7 +87,7 @@ void Hypotheses::begin_rival(Source source) {
     if (rival.without != source || rival.estimator) continue;
     rival.estimator = main_;
     // A first sample that is used at once finds it there, not away.
-    if (main_.knows_motion()) rival.asked_ns = main_.filter().stamp_ns();
+    if (main_.sensors().know_motion()) rival.asked_ns = main_.filter().stamp_ns();
   }
 }
 
@@ -101,7 +102,7 @@ void Hypotheses::ask(Rival& rival) {
     if (!rival.estimator) return;
     const bool consistent = !contradicts_itself(rival);
     // What the main one has not used yet the rival does not lack: it is not away.
-    if (main_.watch(rival.without).used_ns == 0 && rival.estimator->knows_motion()) rival.asked_ns = now_ns;
+    if (main_.watch(rival.without).used_ns == 0 && rival.estimator->sensors().know_motion()) rival.asked_ns = now_ns;
     if (consistent && core::seconds(now_ns - rival.asked_ns) < kSameSpeedsS) extrapolate(rival, now_ns);
     rival.contradicted = rival.contradicted || !consistent;
     if (rival.contradicted && main_is_sound_without(rival.without)) begin_again(rival);
@@ -112,7 +113,7 @@ void Hypotheses::ask(Rival& rival) {
     // It was away: it begins again where the main one is, and what it had said before stays.
     lose_sight(rival, now_ns);
     // A train without camera may have nothing but the rival's wheel.
-    if (rival.contradicted && (main_.knows_motion() || main_.watch(Source::camera).seen_ns != 0)) {
+    if (rival.contradicted && (main_.sensors().know_motion() || main_.watch(Source::camera).seen_ns != 0)) {
       begin_again(rival);
     } else {
       other.place_like(main_);
@@ -129,7 +130,7 @@ void Hypotheses::ask(Rival& rival) {
   const Interval mine = main_.interval();
   Interval its = other.interval();
   double apart_m = other.centre_m() - main_.centre_m();
-  if (rival.without == Source::gnss && main_.gnss_proven()) {
+  if (rival.without == Source::gnss && main_.place().gnss_proven()) {
     const double most_m = main_.gnss_bound_m();
     apart_m = std::clamp(apart_m, -most_m, most_m);
     its.rear_m = std::max(its.rear_m, mine.rear_m - most_m);
@@ -145,31 +146,31 @@ void Hypotheses::ask(Rival& rival) {
 
 bool Hypotheses::can_say(const Rival& rival) const {
   // Nobody watches an IMU in the dark: what the train may do is known without it, too.
-  if (rival.without == Source::imu && rival.estimator && main_.in_the_dark())
-    return rival.estimator->is_consistent(main_.isolated());
+  if (rival.without == Source::imu && rival.estimator && main_.sensors().in_the_dark())
+    return rival.estimator->sensors().are_consistent(main_.sensors().isolated());
   // What the IMU alone leaves open beside a wheel is more and more, but all that a wheel may hide which nobody watches.
-  const double bridge_s = rival.without == Source::wheel ? kUnwatchedWheelS : Estimator::kBridgeS;
-  return rival.estimator && main_.watch(rival.without).used_ns != 0 && rival.estimator->knows_motion(bridge_s) &&
-         !contradicts_itself(rival);
+  const double bridge_s = rival.without == Source::wheel ? kUnwatchedWheelS : MotionSensors::kBridgeS;
+  return rival.estimator && main_.watch(rival.without).used_ns != 0 &&
+         rival.estimator->sensors().know_motion(bridge_s) && !contradicts_itself(rival);
 }
 
 // The one without GNSS has the main one's motion sensors: what that has isolated is no contradiction here.
 bool Hypotheses::contradicts_itself(const Rival& rival) const {
-  return !rival.estimator->is_consistent(rival.without == Source::gnss ? main_.isolated() : 0);
+  return !rival.estimator->sensors().are_consistent(rival.without == Source::gnss ? main_.sensors().isolated() : 0);
 }
 
 // Nothing contradicts anything, and another odometer measures: a rival that has lost its way may begin again, so that
 // it knows its own when it is needed.
 bool Hypotheses::main_is_sound_without(Source source) const {
-  return main_.is_consistent() && std::ranges::any_of(kOdometers, [&](Source odometer) {
-           return odometer != source && main_.measures(odometer);
+  return main_.sensors().are_consistent() && std::ranges::any_of(kOdometers, [&](Source odometer) {
+           return odometer != source && main_.sensors().measures(odometer);
          });
 }
 
 // Two sensors agree in it, of which the main one has left one out without proof: should it begin again, nobody would
 // speak for that sensor.
 bool Hypotheses::stands_for_another(const Rival& rival) const {
-  return rival.proven_since_ns != 0 && main_.disputes(kMotionSources, rival.without);
+  return rival.proven_since_ns != 0 && main_.sensors().dispute(kMotionSources, rival.without);
 }
 
 // What it had said before stays.
@@ -195,7 +196,7 @@ void Hypotheses::extrapolate(Rival& rival, int64_t now_ns) {
 
 // Of two odometers the main one has isolated, without proof, the one that the rival believes.
 bool Hypotheses::is_in_dispute(const Rival& rival) const {
-  return main_.disputes(kOdometers, rival.without);
+  return main_.sensors().dispute(kOdometers, rival.without);
 }
 
 Sides Hypotheses::beyond(const Interval& mine, const Interval& its) {

@@ -48,8 +48,10 @@ void ScaleTrial::apply(const Event& event) {
 void ScaleTrial::give_place_up() {
   const auto& mine = main();
   const auto& free = unlearnt_->main();
-  if (!mine.path() && free.path()) unlearnt_->give_place_up(mine.given_up().value_or(Against::sightings));
-  if (mine.path() && !free.path()) main_.give_place_up(free.given_up().value_or(Against::sightings));
+  if (!mine.place().path() && free.place().path())
+    unlearnt_->give_place_up(mine.place().given_up().value_or(Against::sightings));
+  if (mine.place().path() && !free.place().path())
+    main_.give_place_up(free.place().given_up().value_or(Against::sightings));
 }
 
 void ScaleTrial::drop_saved() {
@@ -66,7 +68,7 @@ bool ScaleTrial::contradicted(const Event& event) {
     return fix->kind == FixKind::landmark && main_.fix_fitted() == false && unlearnt_->fix_fitted() == true;
   }
   if (std::holds_alternative<GnssInput>(event)) {
-    return main().watch(Source::gnss).isolated && unlearnt_->main().gnss_proven();
+    return main().watch(Source::gnss).isolated && unlearnt_->main().place().gnss_proven();
   }
   if (!ratio_is_another()) {
     apart_since_ns_ = 0;
@@ -78,14 +80,16 @@ bool ScaleTrial::contradicted(const Event& event) {
 
 bool ScaleTrial::ratio_is_another() const {
   const auto& free = unlearnt_->main();
-  if (!free.has_ever_measured(Source::camera) || !free.has_ever_measured(Source::wheel) || !free.is_consistent())
+  if (!free.sensors().has_ever_measured(Source::camera) || !free.sensors().has_ever_measured(Source::wheel) ||
+      !free.sensors().are_consistent())
     return false;
   const auto& p = *parameters_;
   const auto& filter = free.filter();
-  const double saved_sigma = std::sqrt(std::max(
-      0.0, std::pow(saved_.camera_sigma, 2) + std::pow(saved_.wheel_sigma, 2) -
-               2 * saved_.correlation * saved_.camera_sigma * saved_.wheel_sigma +
-               (std::pow(p.visual_scale_walk, 2) + std::pow(p.wheel_scale_walk, 2)) * std::abs(free.distance_m())));
+  const double saved_sigma =
+      std::sqrt(std::max(0.0, std::pow(saved_.camera_sigma, 2) + std::pow(saved_.wheel_sigma, 2) -
+                                  2 * saved_.correlation * saved_.camera_sigma * saved_.wheel_sigma +
+                                  (std::pow(p.visual_scale_walk, 2) + std::pow(p.wheel_scale_walk, 2)) *
+                                      std::abs(free.motion().distance_m())));
   const double saved_ratio = (1 + saved_.wheel) / (1 + saved_.camera);
   const double ratio = filter.scale(Odometer::wheel) / filter.scale(Odometer::camera);
   return std::abs(ratio - saved_ratio) > kRatioSigmas * std::hypot(saved_sigma, filter.sigma(StateIndex::other_scale));
@@ -106,7 +110,7 @@ bool ScaleTrial::missing(Odometer odometer) const {
 // Whatever is left to be wrong of the scales is less than the interval grows with the way since the reference.
 bool ScaleTrial::confirmed() const {
   const auto& free = unlearnt_->main();
-  if (!main().is_consistent() || !free.is_consistent()) return false;
+  if (!main().sensors().are_consistent() || !free.sensors().are_consistent()) return false;
   bool tried = false;
   bool untried = false;
   for (const auto odometer : {Odometer::camera, Odometer::wheel}) {
@@ -137,7 +141,7 @@ void ScaleTrial::follow_on(const std::shared_ptr<const track::Path>& path,
 }
 
 bool ScaleTrial::slip_began() const {
-  return main().slip_began() || (unlearnt_ && unlearnt_->main().slip_began());
+  return main().motion().slip_began() || (unlearnt_ && unlearnt_->main().motion().slip_began());
 }
 
 uint32_t ScaleTrial::slipping() const {
@@ -156,7 +160,7 @@ TrainEstimate ScaleTrial::estimate() const {
 }
 
 std::optional<OdometerScales> ScaleTrial::learnt() const {
-  if (unlearnt_ || !main().is_consistent()) return std::nullopt;
+  if (unlearnt_ || !main().sensors().are_consistent()) return std::nullopt;
   const auto scales = main_.scales();
   const auto before = unlearnt_scales(*parameters_);
   const bool taught = scales.camera_sigma < kTaughtShare * before.camera_sigma ||

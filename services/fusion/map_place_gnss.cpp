@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fusion/estimator.hpp"
+#include "fusion/map_place.hpp"
 
 namespace railfix::fusion {
 namespace {
@@ -53,58 +53,72 @@ FootOnPath foot_on_path(const track::Path& path, double start_m, double easting_
 
 }  // namespace
 
-bool Estimator::may_be_beyond(double end_m) const {
-  const auto known = widened(interval());
-  return end_m > place_.path->begin_m() ? known.front_m >= end_m : known.rear_m <= end_m;
+bool MapPlace::gnss_denies() const {
+  const bool never_agreed = gnss_.watch.used_ns == 0 && !known_.told.believed();
+  return gnss_.watch.isolated && (never_agreed || known_.wrong_place.lost());
+}
+
+double MapPlace::gnss_bound_m(const TrainMotion& motion) const {
+  return parameters_->gnss_bound_m + parameters_->gnss_lag_s * std::abs(motion.filter().speed_mps());
+}
+
+void MapPlace::exclude_gnss(const MapPlace& other, int64_t stamp_ns) {
+  gnss_.watch = other.gnss_.watch;
+  gnss_.watch.convict(stamp_ns);
+}
+
+bool MapPlace::may_be_beyond(double end_m, const TrainMotion& motion) const {
+  const auto known = widened(interval(motion), motion);
+  return end_m > known_.path->begin_m() ? known.front_m >= end_m : known.rear_m <= end_m;
 }
 
 // Tested as it is; what is new in it beside the fix before is little, because its error lasts.
-void Estimator::use(const GnssInput& sample) {
-  auto& gnss = watched(Source::gnss);
-  gnss.seen_ns = sample.stamp_ns;
-  if (sample.fix == 0 || !place_.path) {
-    gnss_agreed_ = 0;
+void MapPlace::use(const GnssInput& sample, TrainMotion& motion) {
+  gnss_.watch.seen_ns = sample.stamp_ns;
+  if (sample.fix == 0 || !known_.path) {
+    gnss_.agreed = 0;
     return;
   }
-  const auto place = foot_on_path(*place_.path, filter_.path_distance_m(), sample.easting_m, sample.northing_m);
+  auto& filter = motion.filter();
+  const auto place = foot_on_path(*known_.path, filter.path_distance_m(), sample.easting_m, sample.northing_m);
   const double once_m = std::hypot(gnss_sigma_m(sample, *parameters_), parameters_->gnss_map_sigma_m);
   const double antenna_m = parameters_->gnss_antenna_ahead_m;
   // The map ends before: its end is not where the train is, if it may have come there at all.
   const bool beyond = std::abs(place.straight_on_m - place.distance_m) > once_m;
   const auto agrees_at = [&](double foot_m) {
-    return filter_.test_position(foot_m - antenna_m, once_m, parameters_->gate_gnss).used;
+    return filter.test_position(foot_m - antenna_m, once_m, parameters_->gate_gnss).used;
   };
-  if (beyond && (may_be_beyond(place.distance_m) || agrees_at(place.straight_on_m))) return;
+  if (beyond && (may_be_beyond(place.distance_m, motion) || agrees_at(place.straight_on_m))) return;
   const double foot_m = place.distance_m - antenna_m;
   const bool beside = beyond || std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
   const bool agrees = !beside && agrees_at(place.distance_m);
   const MeasuredPlace measured{foot_m, kGnssNewShare * once_m, StateIndex::gnss_error, kGnssLastingShare * once_m};
-  if (gnss.isolated) {
-    gnss.hear(agrees, kAgreementsOfGnss, sample.stamp_ns);
-    hold_gnss(foot_m, once_m);
-  } else if (agrees && filter_.offer_position(measured, parameters_->gate_gnss).used) {
-    gnss.accept(sample.stamp_ns);
-    ++gnss_agreed_;
-    place_.told.gnss_agrees(sample.tells_track, is_rtk(sample) && once_m <= kSharpGnssM);
+  if (gnss_.watch.isolated) {
+    gnss_.watch.hear(agrees, kAgreementsOfGnss, sample.stamp_ns);
+    hold_gnss(foot_m, once_m, motion);
+  } else if (agrees && filter.offer_position(measured, parameters_->gate_gnss).used) {
+    gnss_.watch.accept(sample.stamp_ns);
+    ++gnss_.agreed;
+    known_.told.gnss_agrees(sample.tells_track, is_rtk(sample) && once_m <= kSharpGnssM);
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
-    if (gnss_proven()) place_.wrong_place.found();
-  } else if (++gnss.refused >= kRefusalsToIsolate) {
-    gnss_was_proven_ = gnss_proven();
-    gnss.isolate(sample.stamp_ns);
-    gnss_agreed_ = 0;
+    if (gnss_proven()) known_.wrong_place.found();
+  } else if (++gnss_.watch.refused >= kRefusalsToIsolate) {
+    gnss_.was_proven = gnss_proven();
+    gnss_.watch.isolate(sample.stamp_ns);
+    gnss_.agreed = 0;
   }
 }
 
 // A wheel that nobody sees may slide, proven GNSS may be wrong: who is, nobody knows. Of the last word of each. A
 // camera that comes back does not undo it.
-void Estimator::hold_gnss(double foot_m, double sigma_m) {
-  const bool began_unseen = !sees() || doubts_.gnss.behind_m + doubts_.gnss.ahead_m > 0;
-  if (!watch(Source::gnss).isolated) {
-    doubts_.gnss = {};
-  } else if (gnss_was_proven_ && began_unseen) {
-    const double off_m = foot_m - filter_.path_distance_m();
+void MapPlace::hold_gnss(double foot_m, double sigma_m, const TrainMotion& motion) {
+  const bool began_unseen = !motion.sensors().see() || gnss_.held.behind_m + gnss_.held.ahead_m > 0;
+  if (!gnss_.watch.isolated) {
+    gnss_.held = {};
+  } else if (gnss_.was_proven && began_unseen) {
+    const double off_m = foot_m - motion.filter().path_distance_m();
     const double reach_m = parameters_->interval_factor * sigma_m;
-    doubts_.gnss = {std::max(0.0, reach_m - off_m), std::max(0.0, reach_m + off_m)};
+    gnss_.held = {std::max(0.0, reach_m - off_m), std::max(0.0, reach_m + off_m)};
   }
 }
 
