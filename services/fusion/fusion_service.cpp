@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <string_view>
 #include <utility>
 
 #include "core/time.hpp"
@@ -31,7 +30,6 @@ constexpr int64_t kCatchUpNs = 2 * core::kNsPerSecond;
 constexpr double kSameBeginS = 0.5;  // a replay that is looped begins where it began before
 constexpr double kOutOfOrderS = 2.0;
 constexpr double kStandsMps = 1.0;
-constexpr const char* kInDoubt = " in doubt";  // in the notes
 
 Fusion make_fusion(const FusionConfig& config, const std::shared_ptr<const track::Map>& map,
                    const std::optional<SavedScales>& saved) {
@@ -70,7 +68,7 @@ FusionService::FusionService(const FusionConfig& config, service::Context& conte
   context_.on<msg::DataClock>(data_clock, [this](const msg::DataClock& m) { keep_time(m); });
   context_.every(kTickPeriod, [this] { tick(); });
   if (!context_.common().lock_step) {
-    remember();
+    known_ = from_notes(kept_for_, context_.kept());
     share_charge();
   }
   context_.at_restart([this](int64_t data_ns) { restart(data_ns); });
@@ -108,8 +106,7 @@ void FusionService::hear(const msg::TrainState& state) {
   if (!place_at(map_, known_place_of(state, false), state.stamp_ns(), config_.parameters.interval_factor))
     return;  // soon
   learnt_ = true;
-  known_ = state;
-  known_in_doubt_ = false;
+  known_ = KnownState{state};
   begin_anew();
 }
 
@@ -122,38 +119,23 @@ bool FusionService::tell_other_map(const msg::TrainState& state) {
   return true;
 }
 
-// Notes of the process before, if they are of this train's present ride.
-void FusionService::remember() {
-  const auto& notes = context_.kept();
-  if (!notes.starts_with(kept_for_)) return;
-  const size_t line_end = notes.find('\n', kept_for_.size());
-  if (line_end == std::string::npos) return;
-  msg::TrainState state;
-  const std::vector<uint8_t> cdr(notes.begin() + static_cast<std::ptrdiff_t>(line_end) + 1, notes.end());
-  if (!messaging::deserialize(cdr, state) || !std::isfinite(state.distance_m())) return;
-  known_ = state;
-  noted_ns_ = std::atoll(notes.c_str() + kept_for_.size());
-  known_in_doubt_ = std::string_view(notes).substr(0, line_end).ends_with(kInDoubt);
-}
-
 void FusionService::keep(const msg::TrainState& state) {
   if (context_.common().lock_step || std::abs(state.stamp_ns() - kept_ns_) < kKeepPeriodNs) return;
   kept_ns_ = state.stamp_ns();
-  const auto cdr = messaging::serialize(state);
-  context_.keep(kept_for_ + std::to_string(core::monotonic_ns()) + (in_doubt_ ? kInDoubt : "") + '\n' +
-                std::string(cdr.begin(), cdr.end()));
+  context_.keep(to_notes(kept_for_, {state, in_doubt_, core::monotonic_ns()}));
 }
 
-// A known place is wanted at the time of the first state of the fusion that is to go on from it. False: that fusion has
+// A known state is wanted at the time of the first state of the fusion that is to go on from it. False: that fusion has
 // only just been made, or has been told its place, and this state is of the one that did not know; or it is not certain
 // yet whether the place is of this ride.
-bool FusionService::take_over_known(const TrainEstimate& first) {
-  const double age_s = core::seconds(first.stamp_ns - known_->stamp_ns());
-  if (noted_ns_) {
+bool FusionService::take_over(const TrainEstimate& first) {
+  const msg::TrainState& state = known_->state;
+  const double age_s = core::seconds(first.stamp_ns - state.stamp_ns());
+  if (known_->noted_ns) {
     // Of the same ride: neither the clock nor a replay has jumped since, nor has another one begun.
-    const double noted_s = core::seconds(core::monotonic_ns() - *noted_ns_);
+    const double noted_s = core::seconds(core::monotonic_ns() - *known_->noted_ns);
     if (catches_up(noted_s - age_s)) return false;
-    noted_ns_.reset();
+    known_->noted_ns.reset();
     const bool same_time = age_s >= 0 && std::abs(age_s - noted_s) <= kSameRideS;
     if (!same_time || age_s > kOldestPlaceS) {
       known_.reset();
@@ -164,18 +146,18 @@ bool FusionService::take_over_known(const TrainEstimate& first) {
       if (under_way) forget_start();
       return !under_way;
     }
-    seq_ = std::max(seq_, known_->seq() + kNumbersUnheard);
+    seq_ = std::max(seq_, state.seq() + kNumbersUnheard);
     // Where the one before had given its start up, too: nothing else makes a place unknown that was told.
-    if (map_ && (known_->track_known() != 0 || believes_start_)) {
+    if (map_ && (state.track_known() != 0 || believes_start_)) {
       begin_anew();
       return false;
     }
   }
-  const double speed_mps = std::isfinite(known_->speed_mps()) ? known_->speed_mps() : 0;
-  distance_offset_m_ = known_->distance_m() + speed_mps * age_s - first.distance_m;
+  const double speed_mps = std::isfinite(state.speed_mps()) ? state.speed_mps() : 0;
+  distance_offset_m_ = state.distance_m() + speed_mps * age_s - first.distance_m;
   bool placed = false;
   if (begun_anew_) {
-    const auto known = known_place_of(*known_, known_in_doubt_);
+    const auto known = known_place_of(state, known_->in_doubt);
     if (const auto place = place_at(map_, known, first.stamp_ns, config_.parameters.interval_factor)) {
       fusion_->add(*place);
       placed = true;
@@ -242,7 +224,6 @@ void FusionService::restart(int64_t data_ns) {
   fusion_.emplace(make_fusion(config, map_, scale_file_.saved()));
   latest_.reset();
   known_.reset();
-  noted_ns_.reset();
   begun_anew_ = learnt_ = in_doubt_ = false;
   fitness_ = 0;
   heard_ns_ = 0;
@@ -364,7 +345,7 @@ void FusionService::publish(const TrainEstimate& measured, int64_t grabbed_ns) {
     forget_start();
     return;
   }
-  if (known_ && !take_over_known(measured)) return;
+  if (known_ && !take_over(measured)) return;
   scale_file_.follow(*fusion_, measured);
   const TrainEstimate estimate = said_of(measured);
   msg::TrainState message = message_of(estimate);

@@ -6,6 +6,7 @@
 
 #include "fusion/fusion.hpp"
 #include "fusion/fusion_config.hpp"
+#include "fusion/fusion_notes.hpp"
 #include "fusion/handover.hpp"
 #include "fusion/map_extent.hpp"
 #include "fusion/scale_file.hpp"
@@ -41,14 +42,13 @@ class FusionService {
   void hear(const msg::TrainState& state);
   bool tell_other_map(const msg::TrainState& state);
   void keep(const msg::TrainState& state);
-  void remember();
   void begin_anew();
   /// Of a train that was under way when this one began: nobody knows where it is.
   void forget_start();
   [[nodiscard]] bool stands_at_start(const TrainEstimate& estimate);
   [[nodiscard]] TrainEstimate said_of(const TrainEstimate& measured) const;
   [[nodiscard]] bool is_played() const;
-  bool take_over_known(const TrainEstimate& first);
+  bool take_over(const TrainEstimate& first);
   bool catches_up(double behind_s);
 
   FusionConfig config_;
@@ -70,10 +70,8 @@ class FusionService {
   service::LeftOut left_out_;
   uint64_t seq_ = 0;
   std::optional<msg::TrainState> latest_;  // of this fusion, sent or not
-  std::optional<msg::TrainState> known_;   // of another one, to begin anew from
-  bool known_in_doubt_ = false;
-  bool in_doubt_ = false;            // the place that is sent now
-  std::optional<int64_t> noted_ns_;  // known_ is of the process before, and when it was noted, monotonic
+  std::optional<KnownState> known_;        // by another one, not taken over yet
+  bool in_doubt_ = false;                  // the place that is sent now
   std::optional<int64_t> behind_since_ns_;
   bool begun_anew_ = false;      // known_ is to be used in the new one
   bool learnt_ = false;          // nothing more to take over
