@@ -74,7 +74,7 @@ class TrainMotion {
   [[nodiscard]] MotionFilter& filter() { return filter_; }  // a place corrects it, too
   [[nodiscard]] const MotionSensors& sensors() const { return sensors_; }
   [[nodiscard]] const GyroWatch& gyro() const { return gyro_.watch; }
-  [[nodiscard]] bool wheel_scatters() const { return wheel_.odometer.scatters(); }
+  [[nodiscard]] bool wheel_scatters() const { return wheel_odometer_.scatters(); }
   /// Of the last event. The filter itself may be a little behind, because samples wait for their mean.
   [[nodiscard]] int64_t stamp_ns() const { return stamp_ns_; }
   [[nodiscard]] double distance_m() const { return filter_.value(StateIndex::distance); }
@@ -96,9 +96,8 @@ class TrainMotion {
   [[nodiscard]] Sides unwatched() const { return unwatched_.may_be_off(*parameters_); }
 
  private:
-  /// The wheel's odometer and its recovery from slip.
+  /// How the wheel recovers from slip.
   struct Wheel {
-    WheelOdometer odometer;
     std::vector<WheelBlock> blocks;
     int64_t counts_since_ns = 0;
     bool on_trial = false;  // had slipped, and was taken back in the dark on the word of an IMU alone
@@ -156,6 +155,7 @@ class TrainMotion {
   SuddenChange sudden_change_;
   Standstill standstill_;
 
+  WheelOdometer wheel_odometer_;
   Wheel wheel_;
   SlipWatch slip_watch_;
   bool slip_began_ = false;

@@ -46,7 +46,7 @@ void TrainMotion::use(const WheelInput& sample) {
   auto& watch = sensors_[Source::wheel];
   if (!watch.isolated) doubt_time(Source::wheel, pulses_, sample.stamp_ns);
   const int64_t before_ns = std::exchange(watch.seen_ns, sample.stamp_ns);
-  const auto reading = wheel_.odometer.read(sample);
+  const auto reading = wheel_odometer_.read(sample);
   slip_watch_.wheel(sample.stamp_ns, reading.odometer_m);
   doubt_silent_wheel(before_ns, reading.way_m);
   std::erase_if(wheel_.blocks, [&](const WheelBlock& block) { return block.until_ns < sample.stamp_ns; });
