@@ -122,13 +122,13 @@ class TrainMotion {
   Offer offer(Source source, int64_t stamp_ns, const std::function<Offer(MotionFilter&)>& offering);
   void doubt_time(Source source, Rhythm& rhythm, int64_t stamp_ns);
 
-  void measure(const OdometryInput& step);
-  void accept(const OdometryInput& step, double sigma_m);
-  void refuse_camera(int64_t stamp_ns, double off_m, bool alone);
+  void use_valid(const OdometryInput& step);
+  void accept_step(const OdometryInput& step, double sigma_m);
+  void refuse_step(int64_t stamp_ns, double off_m, bool alone);
   void compare_with_wheel(const OdometryInput& step, double sigma_m);
   bool blame_wheel_on_trial();
 
-  void measure(int64_t stamp_ns, const WheelReading& reading, int64_t before_ns);
+  void use_reading(int64_t stamp_ns, const WheelReading& reading, int64_t before_ns);
   void isolate_wheel();
   void doubt_silent_wheel(int64_t silent_since_ns, double way_m);
   void watch_alone(double way_m, double dt_s);

@@ -25,14 +25,14 @@ void TrainMotion::use(const OdometryInput& step) {
   if (step.valid) doubt_time(Source::camera, pictures_, step.stamp_ns);
   sensors_[Source::camera].seen_ns = step.stamp_ns;
   if (step.valid) {
-    measure(step);
+    use_valid(step);
   } else {
     slip_watch_.no_picture();
   }
   filter_.clone_now(step.reference_stamp_ns);
 }
 
-void TrainMotion::measure(const OdometryInput& step) {
+void TrainMotion::use_valid(const OdometryInput& step) {
   if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::camera);
   const double sigma_m = std::hypot(step.step_sigma_m, parameters_->step_sigma_floor_m);
   const double dt_s = core::seconds(step.stamp_ns - step.reference_stamp_ns);
@@ -51,13 +51,13 @@ void TrainMotion::measure(const OdometryInput& step) {
     camera.hear(offer.used, kAgreementsOfCamera, step.stamp_ns);
     if (alone) odometers_apart_m_ += std::abs(offer.residual);
   } else if (const auto offer = this->offer(Source::camera, step.stamp_ns, offered_to); offer.used) {
-    accept(step, sigma_m);
+    accept_step(step, sigma_m);
   } else {
-    refuse_camera(step.stamp_ns, offer.residual, alone);
+    refuse_step(step.stamp_ns, offer.residual, alone);
   }
 }
 
-void TrainMotion::accept(const OdometryInput& step, double sigma_m) {
+void TrainMotion::accept_step(const OdometryInput& step, double sigma_m) {
   const bool is_first = !sensors_.has_any_counted();
   unchecked_m_ = is_first ? kSleeperM : 0;
   if (is_first) filter_.doubt_first_speed(Odometer::camera, core::seconds(step.stamp_ns - step.reference_stamp_ns));
@@ -66,7 +66,7 @@ void TrainMotion::accept(const OdometryInput& step, double sigma_m) {
   compare_with_wheel(step, sigma_m);
 }
 
-void TrainMotion::refuse_camera(int64_t stamp_ns, double off_m, bool alone) {
+void TrainMotion::refuse_step(int64_t stamp_ns, double off_m, bool alone) {
   auto& camera = sensors_[Source::camera];
   slip_watch_.no_picture();
   // One that is refused now and then always says the same where the film has pictures twice.

@@ -54,11 +54,11 @@ void TrainMotion::use(const WheelInput& sample) {
     isolate_wheel();
     slip_began_ = false;
   }
-  measure(sample.stamp_ns, reading, before_ns);
+  use_reading(sample.stamp_ns, reading, before_ns);
   watch_alone(reading.way_m, before_ns == 0 ? 0.0 : core::seconds(sample.stamp_ns - before_ns));
 }
 
-void TrainMotion::measure(int64_t stamp_ns, const WheelReading& reading, int64_t before_ns) {
+void TrainMotion::use_reading(int64_t stamp_ns, const WheelReading& reading, int64_t before_ns) {
   auto& watch = sensors_[Source::wheel];
   if (reading.is_first) {
     if (filter_.unit() == Odometer::none) filter_.choose_unit(Odometer::wheel);
