@@ -139,7 +139,6 @@ bool MapPlace::is_off_map(const TrainMotion& motion) const {
   return known.rear_m > path.end_m() || known.front_m < path.begin_m();
 }
 
-// The mean belongs to the middle of its period, which lies v * period / 2 behind.
 void MapPlace::use(const YawRate& rate, TrainMotion& motion) {
   auto& filter = motion.filter();
   const double speed_mps = filter.speed_mps();
@@ -163,6 +162,7 @@ void MapPlace::use(const YawRate& rate, TrainMotion& motion) {
   known_.turned_way.add({here_m - speed_mps * period_s, here_m,
                          (rate.rps - filter.value(StateIndex::gyro_bias)) * period_s, gyro_sigma_rps * period_s,
                          period_s});
+  // The mean belongs to the middle of its period.
   const auto point = known_.path->at(here_m - 0.5 * speed_mps * period_s);
   // A tenth of the curvature covers the map's error, which is the same for a whole curve.
   const double sigma_rps =
