@@ -23,6 +23,7 @@ constexpr double kTurnSigmasOfTwo = 2.0;  // without the worst second
 void MapPlace::start_on(std::shared_ptr<const track::Path> path, const TrainMotion& motion) {
   known_.path = std::move(path);
   known_.told.tell(ToldBy::start);
+  known_.told_m = motion.distance_m();
   doubt_points_behind(motion);
 }
 
@@ -58,6 +59,7 @@ void MapPlace::give_up(Against because) {
   claimed_ = {};
   gnss_.watch = {};
   gnss_.agreed = 0;
+  gnss_.agreed_on_way = false;
   landmarks_ = {};
   curves_ = {};
   refused_.reset();

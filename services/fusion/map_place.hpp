@@ -91,7 +91,7 @@ class MapPlace {
   [[nodiscard]] const SensorWatch& curves() const { return curves_; }
   /// GNSS has agreed with the motion for a while, and with a place that it had not given itself.
   [[nodiscard]] bool gnss_proven() const { return gnss_.agreed >= kGnssProof && known_.told.by() != ToldBy::gnss; }
-  /// GNSS, which has never agreed with it, says otherwise, and hardly anything speaks for it.
+  /// GNSS, which has never agreed with it under way, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies() const;
   /// What GNSS that agrees with the motion may still be wrong by.
   [[nodiscard]] double gnss_bound_m(const TrainMotion& motion) const;
@@ -116,6 +116,7 @@ class MapPlace {
     TurnedWay turned_way;
     WrongPlace wrong_place;
     OtherWays other_ways;
+    double told_m = 0;  // the distance run when it was told
     uint32_t reference = 0;
     double fix_m = 0;                // the distance run at the last fix that settled what was in doubt ...
     double reference_m = 0;          // ... and at the reference
@@ -128,9 +129,10 @@ class MapPlace {
   };
   struct Gnss {
     SensorWatch watch;
-    int agreed = 0;           // fixes, since three in a row were refused or one had no place
-    bool was_proven = false;  // when three in a row were
-    Sides held;               // where it contradicts a wheel alone, it says that the train is so far away
+    int agreed = 0;              // fixes, since three in a row were refused or one had no place
+    bool agreed_on_way = false;  // behind some way since the place was told
+    bool was_proven = false;     // when three in a row were
+    Sides held;                  // where it contradicts a wheel alone, it says that the train is so far away
   };
 
   void use_track(const FixInput& fix, const TrainMotion& motion);
@@ -140,6 +142,7 @@ class MapPlace {
   Offer offer(const MeasuredPlace& place, const FixContext& context, TrainMotion& motion) const;
   Offer offer_again(const MeasuredPlace& place, MotionFilter& filter) const;
   [[nodiscard]] bool has_met(uint32_t landmark) const;
+  [[nodiscard]] bool may_fit_by_chance(const FixInput& fix) const;
   void accept(const FixInput& fix, const FixContext& context, TrainMotion& motion);
   void settle(const FixInput& fix, const FixContext& context, TrainMotion& motion);
   void mark_reference(const FixInput& fix, const TrainMotion& motion);
@@ -153,6 +156,7 @@ class MapPlace {
 
   [[nodiscard]] bool may_be_beyond(double end_m, const TrainMotion& motion) const;
   [[nodiscard]] bool is_off_map(const TrainMotion& motion) const;
+  [[nodiscard]] bool tells_direction(double gnss_sigma_m, const TrainMotion& motion) const;
   void hold_gnss(double foot_m, double sigma_m, const TrainMotion& motion);
 
   void doubt_points_behind(const TrainMotion& motion);

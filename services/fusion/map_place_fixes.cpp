@@ -78,6 +78,7 @@ void MapPlace::begin_with(const FixInput& fix, const FixContext& context, TrainM
   accept(fix, context, motion);
   if (fix.of_before) doubt_points_behind(motion);
   known_.told.tell(fix.kind == FixKind::gnss ? ToldBy::gnss : fix.only_told ? ToldBy::start : ToldBy::nobody);
+  known_.told_m = motion.distance_m();
   if (fix.in_doubt) known_.wrong_place.doubt();
 }
 
@@ -92,9 +93,10 @@ void MapPlace::compare(const FixInput& fix, double path_distance_m, const FixCon
     return;
   }
   corrected_ = false;
+  const bool is_new = fix.kind == FixKind::landmark && !fix_.again;
+  if (is_new) known_.told.agrees(fix);
   accept(fix, context, motion);
-  if (!fix_.used() || fix.kind != FixKind::landmark || fix_.again) return;
-  known_.told.agrees(fix);
+  if (!is_new) return;
   // It or the one before is wrong by more than it says, or both are: what makes one err makes its neighbour err alike.
   // Until the next one.
   if (fix_.sigmas_off(context.excess_m) >= kSurprisingSigmas) claimed_ = {reach_m(fix.sigma_m), reach_m(fix.sigma_m)};
@@ -146,16 +148,29 @@ Offer MapPlace::offer_again(const MeasuredPlace& place, MotionFilter& filter) co
   return offer;
 }
 
+// Some curve fits at a place that nobody has confirmed, though the train turns otherwise than the track there; and a
+// mast, where masts stand everywhere, at a start that nobody has.
+bool MapPlace::may_fit_by_chance(const FixInput& fix) const {
+  const auto& told = known_.told;
+  if (fix.kind == FixKind::landmark) return told.waits_for_more();
+  if (fix.kind != FixKind::curvature) return false;
+  return told.is_only_told() || told.by() == ToldBy::gnss || known_.track_doubt.turns_otherwise();
+}
+
 void MapPlace::accept(const FixInput& fix, const FixContext& context, TrainMotion& motion) {
   const auto& filter = motion.filter();
   watch_of(fix).accept(fix.stamp_ns);
   off_path_.reset();
-  // Some curve may fit at a place that nobody has confirmed, though the train turns otherwise than the track there.
-  const bool far_off = known_.told.is_only_told() || known_.told.by() == ToldBy::gnss;
-  const bool by_chance = fix.kind == FixKind::curvature && (far_off || known_.track_doubt.turns_otherwise());
-  const bool searched = fix.kind == FixKind::network || fix.kind == FixKind::gnss;
-  if (!by_chance) {
+  const bool by_chance = may_fit_by_chance(fix);
+  const bool landmark = fix.kind == FixKind::landmark;
+  if (by_chance && landmark) {
+    known_.track_doubt.may_be_here();
+    known_.wrong_place.may_be_here();
+  } else if (!by_chance) {
+    const bool searched = fix.kind == FixKind::network || fix.kind == FixKind::gnss;
     searched ? known_.track_doubt.found_here() : known_.track_doubt.seen_here();
+  }
+  if (!by_chance || landmark) {
     known_.turned_way.corrected(fix_.offer.residual);
     compare_turns(motion);
   }
@@ -165,7 +180,7 @@ void MapPlace::accept(const FixInput& fix, const FixContext& context, TrainMotio
   if (fix.kind == FixKind::network) known_.told.confirm();
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by
   // themselves.
-  if (fix.kind != FixKind::landmark && fix.sigma_m > 2 * filter.path_sigma_m()) return;
+  if (!landmark && fix.sigma_m > 2 * filter.path_sigma_m()) return;
   fix_.verdict = FixOutcome::Verdict::used;
   refused_.reset();
   if (!by_chance) known_.wrong_place.found();

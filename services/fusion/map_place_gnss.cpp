@@ -7,9 +7,11 @@
 namespace railfix::fusion {
 namespace {
 
-constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
-constexpr double kSharpGnssM = 2.0;   // one sigma of an RTK solution that knows a told start as a landmark does
-constexpr double kOffTrackM = 15.0;   // a GNSS fix further beside the track is none
+constexpr int kAgreementsOfGnss = 5;       // in a row: where it scatters one agrees by chance
+constexpr double kSharpGnssM = 2.0;        // one sigma of an RTK solution that knows a told start as a landmark does
+constexpr double kDirectionSigmas = 10.0;  // of way: on a place turned round GNSS is off by twice as much
+constexpr double kDirectionM = 10.0;       // ... at least
+constexpr double kOffTrackM = 15.0;        // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
 constexpr double kGnssNewShare = 0.5;
@@ -54,7 +56,7 @@ FootOnPath foot_on_path(const track::Path& path, double start_m, double easting_
 }  // namespace
 
 bool MapPlace::gnss_denies() const {
-  const bool never_agreed = gnss_.watch.used_ns == 0 && !known_.told.believed();
+  const bool never_agreed = !gnss_.agreed_on_way && !known_.told.believed();
   return gnss_.watch.isolated && (never_agreed || known_.wrong_place.lost());
 }
 
@@ -99,14 +101,23 @@ void MapPlace::use(const GnssInput& sample, TrainMotion& motion) {
   } else if (agrees && filter.offer_position(measured, parameters_->gate_gnss).used) {
     gnss_.watch.accept(sample.stamp_ns);
     ++gnss_.agreed;
-    known_.told.gnss_agrees(sample.tells_track, is_rtk(sample) && once_m <= kSharpGnssM);
+    if (tells_direction(once_m, motion)) {
+      gnss_.agreed_on_way = true;
+      known_.told.gnss_agrees(sample.tells_track, is_rtk(sample) && once_m <= kSharpGnssM);
+    }
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
     if (gnss_proven()) known_.wrong_place.found();
   } else if (++gnss_.watch.refused >= kRefusalsToIsolate) {
     gnss_.was_proven = gnss_proven();
     gnss_.watch.isolate(sample.stamp_ns);
     gnss_.agreed = 0;
+    known_.told.gnss_contradicts();
   }
+}
+
+// Where the train was told it agrees with a cab that looks the other way just as well.
+bool MapPlace::tells_direction(double gnss_sigma_m, const TrainMotion& motion) const {
+  return std::abs(motion.distance_m() - known_.told_m) >= std::max(kDirectionM, kDirectionSigmas * gnss_sigma_m);
 }
 
 // A wheel that nobody sees may slide, proven GNSS may be wrong: who is, nobody knows. Of the last word of each. A

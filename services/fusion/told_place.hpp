@@ -27,11 +27,18 @@ class ToldPlace {
   void moved_to(const FixInput& fix);
   /// The track bends here as it should.
   void curve_agrees(bool tells_track, bool turns_otherwise);
+  /// GNSS has agreed with it over some way: which way the train runs is known as well.
   void gnss_agrees(bool tells_track, bool is_sharp);
+  /// GNSS is isolated: what it had said for the place counts no more.
+  void gnss_contradicts() {
+    if (by_ == ToldBy::start_and_gnss) by_ = ToldBy::start;
+  }
 
   [[nodiscard]] ToldBy by() const { return by_; }
   /// Nothing has confirmed yet the start that somebody has told.
   [[nodiscard]] bool is_only_told() const { return by_ == ToldBy::start; }
+  /// ... or nobody but GNSS, which knows it to some 10 m.
+  [[nodiscard]] bool waits_for_more() const { return by_ == ToldBy::start || by_ == ToldBy::start_and_gnss; }
   /// What has agreed with it agrees with a track beside it as well.
   [[nodiscard]] bool alike_beside() const { return alike_beside_; }
   /// So many landmarks say that it is here, the first kLandmarksBelieved of them in a row.

@@ -23,6 +23,8 @@ class TrackDoubt {
   /// A place on another track was seen with this probability; a place on this one.
   void seen_elsewhere(double probability);
   void seen_here();
+  /// The same, where it may be chance: the turns go on being asked.
+  void may_be_here() { here_at_most_ = 1; }
   /// It was searched for, and this is where it fits best: the turns may show that it is elsewhere, switch or no switch.
   void found_here();
   /// The train turned as this track does, or not; bends: where that says something.

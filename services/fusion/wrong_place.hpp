@@ -32,6 +32,11 @@ class WrongPlace {
   void doubt() { lost_ = of_before_ = true; }
   /// The place is right, by a landmark or by GNSS that has proven itself.
   void found();
+  /// A landmark is where it should be, which may be chance: what was sighted before it speaks no more, turning does.
+  void may_be_here() {
+    fits_nowhere_ = lost_ = of_before_ = false;
+    lost_m_ = 0;
+  }
   /// The track bends where the train does, by the camera: it may be the gyro that is wrong.
   void bends_here() { turning_m_ = 0; }
   /// The train has run so far.

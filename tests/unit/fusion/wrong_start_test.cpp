@@ -216,6 +216,37 @@ TEST_F(WrongStart, ThatGnssAgreesWithIsOkFromTheFirstLandmarkOnOrAtOnceWhereGnss
   }
 }
 
+// A cab that looks the other way stands where it was told, too.
+TEST_F(WrongStart, ThatGnssAgreedWithAtRestOnlyIsNoPositionWhenItContradictsUnderWay) {
+  for (const uint8_t fix : {uint8_t{1}, uint8_t{4}}) {
+    fusion_ = fusion_at(900);
+    t_s_ = 0;
+    const auto stand = [&] {
+      fusion_.add(GnssInput{at(t_s_), 0, 900, 1, fix});
+      return run(fusion_, t_s_, t_s_ + 1, 0);
+    };
+    for (; t_s_ < 10; t_s_ += 1) EXPECT_EQ(stand().reason, kOnlyTold) << int{fix};
+    const auto gnss = [&] { fusion_.add(GnssInput{at(t_s_), 0, 900 - kSpeedMps * (t_s_ - 10), 1, fix}); };
+    const auto state = go(300, gnss);
+    EXPECT_EQ(state.integrity, Integrity::unusable) << state.reason;
+    EXPECT_THAT(state.reason, HasSubstr(kOnlyTold));
+    EXPECT_THAT(state.reason, Not(HasSubstr("GNSS agrees")));
+  }
+}
+
+TEST_F(WrongStart, IsToldByTurningAlsoWhereMastsStandByChance) {
+  go_straight();
+  int second = 0;
+  const auto masts = [&] {
+    turn(++second % 20 < 10 ? 0.001 : -0.001);
+    if (second % 3 == 0) fusion_.add(fix_at(t_s_, told_m(), 1 + static_cast<uint32_t>(second) % 4));
+    if (second % 9 == 1) fusion_.add(fix_at(t_s_, told_m() + 30, 7));  // never five in a row
+  };
+  const auto state = go(600, masts);
+  EXPECT_THAT(state.reason, HasSubstr("turns otherwise than this track"));
+  EXPECT_EQ(state.integrity, Integrity::unusable) << state.reason;
+}
+
 TEST_F(WrongStart, ThatGnssAgreesWithIsOkFromTheThirdCurveOn) {
   go(100, [] {});
   fusion_.add(GnssInput{at(t_s_), 0, told_m(), 1, 1});
