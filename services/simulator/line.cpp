@@ -13,9 +13,11 @@ constexpr double kShortestPathM = 50.0;
 constexpr double kSeenBehindM = 10.0;
 constexpr double kSeenAheadM = 260.0;
 constexpr double kLonePlatformM = 120.0;
-constexpr double kSameSideM = 1.0;   // marks of one platform are as far from the track
-constexpr double kNearM = 40.0;      // edges so near to the path are drawn
-constexpr double kBesideM = 9.0;     // landmarks of other tracks so near are landmarks of the path
+constexpr double kSameSideM = 1.0;     // marks of one platform are as far from the track
+constexpr double kNearM = 40.0;        // edges so near to the path are drawn
+constexpr double kBesideM = 9.0;       // landmarks of other tracks so near are landmarks of the path ...
+constexpr double kAlongCosine = 0.94;  // ... but not of those that cross it at more than 20 degrees, on a bridge mostly
+constexpr double kLongestTunnelM = 60000.0;
 constexpr double kOneTunnelM = 6.0;  // tracks so near share a tunnel
 constexpr double kTunnelHalfWidthM = 2.7;
 constexpr double kAbutmentM = 4.5;      // from the outermost track
@@ -125,6 +127,17 @@ bool comes_near(const Neighbourhood& neighbourhood, const track::Alignment& alig
   return neighbourhood.has(alignment.at(alignment.length_m()).pose);
 }
 
+// The last portal behind its beginning was a way in.
+bool begins_in_tunnel(const track::Path& way_here, double begin_m) {
+  bool inside = false;
+  for (const auto& mark : way_here.landmarks()) {
+    if (mark.distance_m > begin_m) break;
+    if (mark.kind == track::LandmarkKind::portal_in) inside = true;
+    if (mark.kind == track::LandmarkKind::portal_out) inside = false;
+  }
+  return inside;
+}
+
 }  // namespace
 
 core::Result<Line> Line::make(std::shared_ptr<const track::Map> map, const track::EdgePosition& start, double ahead_m,
@@ -132,6 +145,7 @@ core::Result<Line> Line::make(std::shared_ptr<const track::Map> map, const track
   auto counted = start;
   counted.direction = track::Direction::forward;
   const auto before = track::Path::follow(map, counted, 0.0, kCountedM);
+  const auto way_here = track::Path::follow(map, start, 0.0, kLongestTunnelM);
   auto path = track::Path::follow(std::move(map), start, ahead_m + kSeenAheadM, kSeenBehindM, via);
   if (!path.ok()) return path.error();
   if (path.value().end_m() < kShortestPathM) {
@@ -141,6 +155,7 @@ core::Result<Line> Line::make(std::shared_ptr<const track::Map> map, const track
   Line line(std::move(path).value());
   line.counted_from_m_ = before.ok() ? -before.value().begin_m() : 0.0;
   line.counted_forward_ = start.direction != track::Direction::reverse;
+  line.begins_in_tunnel_ = way_here.ok() && begins_in_tunnel(way_here.value(), line.path_.begin_m());
   line.sample_main();
   line.sample_branches();
   line.collect_things();
@@ -187,6 +202,10 @@ Spot Line::spot_of(double easting_m, double northing_m) const {
           -de * std::cos(pose.heading_rad) + dn * std::sin(pose.heading_rad)};
 }
 
+double Line::heading_near(const track::PlanPose& pose) const {
+  return main_.samples[nearest_sample(main_, pose.easting_m, pose.northing_m)].pose.heading_rad;
+}
+
 void Line::collect_things() {
   for (const auto& mark : path_.landmarks())
     things_.push_back({mark.kind, mark.distance_m, mark.lateral_m, true, mark.lateral_m < 0.0 ? -1.0 : 1.0});
@@ -198,6 +217,7 @@ void Line::collect_things() {
                                  mark->kind == track::LandmarkKind::balise;
       if (!stands_beside) continue;
       const auto pose = alignment.at(mark->offset_m).pose;
+      if (std::abs(std::cos(pose.heading_rad - heading_near(pose))) < kAlongCosine) continue;
       const auto centre = spot_of(pose.easting_m, pose.northing_m);
       const auto spot = spot_of(pose.easting_m - mark->lateral_m * std::cos(pose.heading_rad),
                                 pose.northing_m + mark->lateral_m * std::sin(pose.heading_rad));
@@ -221,6 +241,10 @@ void Line::collect_objects() {
     }
     return nearest;
   };
+  if (begins_in_tunnel_) {
+    tunnels_.push_back({path_.begin_m() - kSeenAheadM, path_.end_m() + kSeenAheadM});
+    open_tunnels.push_back(true);
+  }
   for (const auto& thing : things_) {
     const Spot spot{thing.distance_m, thing.lateral_m};
     switch (thing.kind) {
@@ -244,7 +268,7 @@ void Line::collect_objects() {
         centred.lateral_m = 0.0;
         const bool inside_one = std::find(open_tunnels.begin(), open_tunnels.end(), true) != open_tunnels.end();
         if (thing.kind == track::LandmarkKind::portal_out && !inside_one) {
-          // The way out of a tunnel that the path began in.
+          // Of a tunnel whose way in the map lacks.
           tunnels_.push_back({path_.begin_m() - kSeenAheadM, thing.distance_m});
           open_tunnels.push_back(false);
           break;

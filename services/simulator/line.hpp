@@ -116,9 +116,12 @@ class Line {
   void collect_objects();
   void place_distractors();
   [[nodiscard]] Spot spot_of(double easting_m, double northing_m) const;
+  /// Of the path where it is nearest.
+  [[nodiscard]] double heading_near(const track::PlanPose& pose) const;
   track::Path path_;
   double counted_from_m_ = 0;
   bool counted_forward_ = true;
+  bool begins_in_tunnel_ = false;
   CentreLine main_;
   std::vector<CentreLine> branches_;
   std::vector<Thing> things_;

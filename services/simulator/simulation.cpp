@@ -95,6 +95,14 @@ class Studio {
   core::Status status_;
 };
 
+bool comes_to(const track::Path& path, uint32_t edge, double ahead_m) {
+  const double end_m = std::min(ahead_m, path.end_m());
+  for (double s = 0.0; s < end_m; s += 1.0) {
+    if (path.position_at(s).edge == edge) return true;
+  }
+  return path.position_at(end_m).edge == edge;
+}
+
 core::Result<std::shared_ptr<const Line>> make_line(const SimulationOptions& options) {
   auto map = options.map;
   if (!map) {
@@ -114,6 +122,13 @@ core::Result<std::shared_ptr<const Line>> make_line(const SimulationOptions& opt
       options.run.length_m > 0.0 ? options.run.length_m : options.run.duration_s * options.run.cruise_mps;
   auto line = Line::make(map, start.value(), ahead_m, via);
   if (!line.ok()) return line.error();
+  for (size_t i = 0; i < via.size(); ++i) {
+    if (!comes_to(line.value().path(), via[i], ahead_m)) {
+      return core::Error{"--via " + options.via[i] + ": the way from " + options.start +
+                         " does not come to it within " + std::to_string(std::lround(ahead_m)) +
+                         " m; name the edge behind the switch to turn at"};
+    }
+  }
   return std::shared_ptr<const Line>(std::make_shared<Line>(std::move(line).value()));
 }
 
@@ -124,9 +139,13 @@ core::Result<SimulationReport> simulate(const SimulationOptions& options, const 
   if (!line.ok()) return line.error();
   auto scenario = Scenario::make(options.scenario, options.seed);
   if (!scenario.ok()) return scenario.error();
+  const Trajectory trajectory(line.value(), options.run, options.mount, options.shake, options.seed);
+  if (options.run.stop_at_m >= trajectory.length_m() && options.run.stop_at_m > 0.0) {
+    return core::Error{"--stop-at-m: the train runs " + std::to_string(std::lround(trajectory.length_m())) +
+                       " m only and cannot stop beyond"};
+  }
   const auto writer = DatasetWriter::create(options.out);
   if (!writer.ok()) return writer.error();
-  const Trajectory trajectory(line.value(), options.run, options.mount, options.shake, options.seed);
   const auto exposures = scenario.value().exposures(trajectory, options.rate_hz);
   const SensorModel sensors(trajectory, options.sensors, options.seed);
   const auto& out = writer.value();

@@ -192,5 +192,17 @@ TEST(Dataset, RefusesWhatCannotBe) {
   EXPECT_THAT(report.error().message, testing::HasSubstr("not empty"));
 }
 
+TEST(Dataset, OfAWayThatIsNotRunIsRefusedBeforeAnythingIsWritten) {
+  const Folder folder("railfix-sim-refused");
+  auto options = short_run(folder.path);
+  options.start = "1:100";
+  options.via = {"loop"};
+  EXPECT_THAT(simulate_quietly(options).error().message, testing::HasSubstr("--via loop"));
+  options.via = {};
+  options.run.stop_at_m = 40;
+  EXPECT_THAT(simulate_quietly(options).error().message, testing::HasSubstr("--stop-at-m: the train runs 30 m only"));
+  EXPECT_FALSE(fs::exists(folder.path));
+}
+
 }  // namespace
 }  // namespace railfix::simulator

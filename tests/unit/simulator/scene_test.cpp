@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/units.hpp"
 #include "scene.hpp"
 #include "simulator/dataset_writer.hpp"
 
@@ -236,6 +237,41 @@ TEST(Ground, StonesLieAsDeepAsTheyShow) {
   }
   EXPECT_GT(agreeing, 8);
   EXPECT_GT(deep, 2);
+}
+
+std::shared_ptr<track::Map> straight_line_of_5_km() {
+  auto map = std::make_shared<track::Map>();
+  map->edges.push_back({1, "line", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{5000, 0, 0}})});
+  map->nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", 0, 5000}};
+  return map;
+}
+
+TEST(Scene, ALineThatBeginsAndEndsInATunnelLiesInIt) {
+  auto map = straight_line_of_5_km();
+  map->landmarks = {{1, track::LandmarkKind::portal_in, 1, 100, 0, 0, ""},
+                    {2, track::LandmarkKind::portal_out, 1, 4000, 0, 0, ""}};
+  for (const char* start : {"1:2000:+", "1:2300:-"}) {
+    const auto line = Line::make(map, map->parse_position(start).value(), 200).value();
+    EXPECT_GT(line.depth_in_tunnel_m(0), 100) << start;
+    EXPECT_GT(line.depth_in_tunnel_m(200), 100) << start;
+  }
+  const auto behind = Line::make(map, map->parse_position("1:4100:+").value(), 200).value();
+  EXPECT_TRUE(behind.tunnels().empty());
+  const auto leaves = Line::make(map, map->parse_position("1:3900:+").value(), 200).value();
+  ASSERT_EQ(leaves.tunnels().size(), 1);
+  EXPECT_DOUBLE_EQ(leaves.tunnels()[0].end_m, 100);
+}
+
+// The map does not say which is above.
+TEST(Scene, WhatStandsBesideALineThatCrossesOnABridgeDoesNotStandBesideTheTrackBelow) {
+  auto map = straight_line_of_5_km();
+  map->edges.push_back({2, "above", 3, 4, "", track::Alignment::chained({-1000, 1050, core::kPi / 2}, {{2000, 0, 0}})});
+  map->nodes.push_back({3, track::NodeKind::end, "", -1000, 1050});
+  map->nodes.push_back({4, track::NodeKind::end, "", 1000, 1050});
+  map->landmarks = {{1, track::LandmarkKind::mast, 1, 1040, 3, 0, ""},
+                    {2, track::LandmarkKind::mast, 2, 997, 3, 0, ""}};
+  const auto line = Line::make(map, map->parse_position("1:1000:+").value(), 200).value();
+  EXPECT_EQ(line.masts().size(), 1);
 }
 
 }  // namespace

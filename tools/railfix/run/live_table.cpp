@@ -24,8 +24,11 @@ std::string position_line(const TrainPicture& picture) {
   const double elapsed_s = core::seconds(picture.data_ns - picture.data_begin_ns);
   const std::string where =
       s.track_known() != 0 ? fmt::format("edge {} at {:.2f} m", s.edge(), s.offset_m()) : "track not yet known";
+  // Plus zero, so that a train at rest is not written as -0.0.
   const std::string speed =
-      std::isnan(s.speed_mps()) ? "speed not known" : fmt::format("{:.1f} km/h", core::kmh_from_mps(s.speed_mps()));
+      std::isnan(s.speed_mps())
+          ? "speed not known"
+          : fmt::format("{:.1f} km/h", std::round(10 * core::kmh_from_mps(s.speed_mps())) / 10 + 0.0);
   return fmt::format("{:6.1f} s  {}  -{:.2f}/+{:.2f} m  {}{}  travelled {:.1f} m  integrity {}", elapsed_s, where,
                      s.over_m(), s.under_m(), speed, s.standstill() != 0 ? " (standstill)" : "", s.distance_m(),
                      messaging::name_of_integrity(s.integrity()));
