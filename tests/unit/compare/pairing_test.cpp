@@ -283,6 +283,10 @@ TEST(Pairing, WhatCannotBeComparedIsNoSilence) {
   EXPECT_EQ(
       beside({report(0, kA, 0), report(1, kE, 0), report(2, kE, 20), lost(3), report(5, kB, 40)}, certified, line),
       (std::vector<Beside>{Beside::paired, Beside::off_line, Beside::off_line, Beside::unknown, Beside::unknown}));
+  // Now here, now there: on the line whenever the certified system reports.
+  EXPECT_EQ(beside({report(0.9, kA, 18), report(1.5, kE, 0), report(1.9, kA, 38), report(2.5, kE, 0)},
+                   {report(1, kA, 20), report(2, kA, 40)}, line),
+            (std::vector<Beside>{Beside::off_line, Beside::off_line}));
   // Without a map each group is alone; ours comes to B a report later, or says C instead.
   EXPECT_EQ(beside({report(0, kA, 0), report(2, kA, 40), report(3, kA, 60), report(4, kB, 20)}, certified, Axes()),
             (std::vector<Beside>{Beside::paired, Beside::paired, Beside::paired, Beside::passing, Beside::paired}));

@@ -180,19 +180,28 @@ bool name_the_same(const Said& a, const Said& b) {
   return a.position_known && b.position_known && a.system == b.system;
 }
 
+/// With one of three certified reports in a row.
+bool has_in_common(const Said& ours, const std::vector<Said>& certified, size_t middle) {
+  const size_t last = std::min(middle + 1, certified.size() - 1);
+  for (size_t i = middle - std::min<size_t>(middle, 1); i <= last; ++i) {
+    if (comparable(ours, certified[i]) || name_the_same(ours, certified[i])) return true;
+  }
+  return false;
+}
+
 /// Of a certified report with a position that has no partner.
 Beside beside_alone(const Around& ours, const std::vector<Said>& certified, size_t i, int64_t longest_gap_ns) {
   const auto* last = ours.last;
+  const auto* next = ours.next;
   const bool lately = last != nullptr && certified[i].stamp_ns - last->stamp_ns <= longest_gap_ns;
   if (!lately || !last->position_known) return Beside::unknown;
-  bool in_common = false;
-  for (size_t k = i - std::min<size_t>(i, 1); k <= std::min(i + 1, certified.size() - 1); ++k)
-    in_common |= comparable(*last, certified[k]) || name_the_same(*last, certified[k]);
-  if (!in_common && !last->place && certified[i].place) return Beside::off_line;
-  const auto* next = ours.next;
+  const auto is_off_line = [&](const Said& one) {
+    return one.position_known && !one.place && !has_in_common(one, certified, i);
+  };
+  if (certified[i].place && (is_off_line(*last) || (next != nullptr && is_off_line(*next)))) return Beside::off_line;
   if (next != nullptr && (!next->position_known || next->stamp_ns - last->stamp_ns > longest_gap_ns))
     return Beside::silent;
-  return in_common ? Beside::passing : Beside::other_group;
+  return has_in_common(*last, certified, i) ? Beside::passing : Beside::other_group;
 }
 
 /// Ours at the time of a certified report.

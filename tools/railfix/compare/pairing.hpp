@@ -59,7 +59,7 @@ enum class Beside : uint8_t {
   paired,
   unknown,      // no position, or none lately: that is a matter of Availability
   silent,       // a position, but the next one comes too late to carry it, or is unknown: nothing to compare with
-  off_line,     // a position on another track or at a group that the map lacks, and the certified one is on the line
+  off_line,     // the last or the next counts from a group that is not on the line, and the certified one is on it
   other_group,  // a position that cannot be compared
   passing,      // the two change to the next group one report apart, or name the same group, which the map lacks
 };
