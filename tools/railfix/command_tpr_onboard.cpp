@@ -74,7 +74,8 @@ class OnboardUnit {
     std::istringstream stream(line);
     std::vector<std::string> words{std::istream_iterator<std::string>(stream), {}};
     // The group of a packet 58 may stand before it.
-    std::ranges::stable_partition(words, [](const std::string& word) { return word.starts_with("packet_58="); });
+    std::stable_partition(words.begin(), words.end(),
+                          [](const std::string& word) { return word.starts_with("packet_58="); });
     try {
       for (const std::string& word : words) take(word);
     } catch (const core::BadInput&) {

@@ -1,4 +1,8 @@
 // `railfix tpr listen` with a name of its own at a real Mosquitto: what is confirmed there is gone.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
 #include "integration/tpr/ground_link_fixture.hpp"
 
 namespace railfix {
