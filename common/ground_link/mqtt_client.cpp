@@ -2,9 +2,12 @@
 
 #include <mosquitto.h>
 #include <mqtt_protocol.h>
+#include <poll.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <charconv>
@@ -25,6 +28,7 @@ namespace {
 
 constexpr int kQos1 = 1;
 constexpr int kLoopMs = 200;
+constexpr int kHangUpMs = 2000;
 constexpr double kFirstRetryS = 0.1;
 constexpr int kIdBits = 16;
 constexpr int kMostConnections = 0x7FFF;  // that ids can tell apart
@@ -161,10 +165,29 @@ class MqttClient::Connection {
                                         static_cast<const Connection*>(self)->confirmed(id, code);
                                       });
     mosquitto_message_callback_set(client_.get(), [](mosquitto*, void* self, const mosquitto_message* message) {
-      const auto& events = static_cast<Connection*>(self)->events_;
-      if (events.received)
-        events.received({static_cast<const uint8_t*>(message->payload), static_cast<size_t>(message->payloadlen)});
+      static_cast<Connection*>(self)->take(
+          {static_cast<const uint8_t*>(message->payload), static_cast<size_t>(message->payloadlen)});
     });
+  }
+
+  // Mosquitto's library has made the confirmation of the message, and writes it behind this callback.
+  void take(std::span<const uint8_t> payload) {
+    if (ended_) return;
+    if (events_.received) events_.received(payload);
+    const auto next = events_.next ? events_.next() : MqttNext::go_on;
+    if (next == MqttNext::go_on) return;
+    ended_ = true;
+    if (next == MqttNext::enough) mosquitto_loop_write(client_.get(), 1);
+    hang_up();
+  }
+
+  // A socket that is closed with something unread makes the other end throw away what it has not read: confirmations.
+  void hang_up() {
+    const int socket = mosquitto_socket(client_.get());
+    shutdown(socket, SHUT_WR);
+    std::array<char, 4096> unread;
+    pollfd readable{socket, POLLIN, 0};
+    while (poll(&readable, 1, kHangUpMs) > 0 && read(socket, unread.data(), unread.size()) > 0) continue;
   }
 
   void confirmed(int id, int code) const {
@@ -192,6 +215,10 @@ class MqttClient::Connection {
     while (!stopped()) {
       const auto why = connect_once();
       if (stopped()) break;
+      if (ended_) {
+        if (events_.disconnected) events_.disconnected("no more is taken");
+        break;
+      }
       const bool older = version_is_unknown_ && version_ == MqttVersion::v5;
       version_ = older ? MqttVersion::v3_1_1 : best_version();
       if (older) continue;
@@ -238,6 +265,7 @@ class MqttClient::Connection {
   std::string refusal_;
   MqttVersion version_ = MqttVersion::v5;
   bool version_is_unknown_ = false;  // to the broker
+  bool ended_ = false;               // by MqttNext
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stop_ = false;

@@ -31,6 +31,13 @@ struct MqttOptions {
 
 enum class MqttVersion : uint8_t { v3_1_1 = 4, v5 = 5 };
 
+/// What follows a message that was received.
+enum class MqttNext : uint8_t {
+  go_on,
+  enough,     // it is confirmed, and none behind it: the client ends
+  not_taken,  // nor is it: a broker that keeps the session delivers it again
+};
+
 /// Called in the client's own thread.
 struct MqttEvents {
   std::function<void(MqttVersion)> connected;                // and subscribed, if there is a filter
@@ -41,6 +48,8 @@ struct MqttEvents {
   std::function<void(std::span<const uint8_t> payload)> received;
   /// Nobody has subscribed there, so the broker keeps it for nobody. Version 3.1.1 says `delivered`.
   std::function<void(int id)> unheard = {};
+  /// Asked behind every `received`. Where the client ends by it `disconnected` is the last event.
+  std::function<MqttNext()> next = {};
 };
 
 class MqttClient {

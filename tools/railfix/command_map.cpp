@@ -136,6 +136,12 @@ void add_build(CLI::App& map, Action& chosen) {
       ->check(CLI::Range(0, 16382))
       ->capture_default_str();
   command
+      ->add_option("--q-locacc", request->options.q_locacc_m,
+                   "Q_LOCACC in m of balise groups whose source says none (railML, ERJU): that of the trackside's "
+                   "linking, else its Q_NVLOCACC")
+      ->check(number_between(0.0, 63.0))
+      ->capture_default_str();
+  command
       ->add_option("--landmarks", request->options.landmarks,
                    "Keep landmarks of these kinds alone, for example frog,portal_in,portal_out (default: all)")
       ->transform([](std::string kind) { return CLI::detail::trim(kind); })

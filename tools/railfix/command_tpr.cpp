@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -191,8 +192,20 @@ void decode_message(std::span<const uint8_t> bytes, Baseline baseline, bool json
   refuse_spare(spare);
 }
 
-int decode(const std::string& hex, Baseline baseline, bool json_wanted) {
-  const auto bytes = core::value_or_throw(etcs::parse_hex(hex));
+/// As people paste it: in several words or lines, with 0x or without.
+std::string hex_of(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += word + ' ';
+  if (text == "- ") text = core::value_or_throw(core::read_whole(std::cin, "standard input"));
+  std::istringstream stream(text);
+  std::string hex;
+  for (std::string word; stream >> word;)
+    hex += word.starts_with("0x") || word.starts_with("0X") ? word.substr(2) : word;
+  return hex;
+}
+
+int decode(const std::vector<std::string>& words, Baseline baseline, bool json_wanted) {
+  const auto bytes = core::value_or_throw(etcs::parse_hex(hex_of(words)));
   if (!bytes.empty() && bytes.front() == etcs::kNidPacketReportParameters) {
     decode_packet_58(bytes, json_wanted);
   } else {
@@ -213,26 +226,37 @@ core::Result<Bytes> packet_58_of(const nlohmann::ordered_json& json) {
   return packet.ok() ? etcs::encode(packet.value()) : packet.error();
 }
 
-core::Result<Bytes> message_of(const nlohmann::ordered_json& json, Baseline baseline) {
+core::Result<Bytes> packed(const nlohmann::ordered_json& json, Baseline baseline) {
   const auto report = etcs::report_from_json(json, baseline);
-  if (!report.ok()) return report.error();
-  remark(report.value());
-  return etcs::encode(report.value(), baseline);
+  return report.ok() ? etcs::encode(report.value(), baseline) : report.error();
+}
+
+core::Result<Bytes> message_of(const nlohmann::ordered_json& json, Baseline baseline) {
+  auto bytes = packed(json, baseline);
+  if (bytes.ok()) {
+    remark(etcs::report_from_json(json, baseline).value());
+    return bytes;
+  }
+  const auto other = baseline == Baseline::b3 ? Baseline::b4 : Baseline::b3;
+  if (!packed(json, other).ok()) return bytes;
+  return core::Error{bytes.error().message + " It fits --baseline " + std::to_string(static_cast<int>(other)) + "."};
 }
 
 int encode(const std::string& file, Baseline baseline) {
   const std::string where = file == "-" ? "standard input" : file;
   const auto text = core::value_or_throw(file == "-" ? core::read_whole(std::cin, where) : core::read_whole(file));
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos)
+    throw BadInput(where + ": is empty; give the fields as `railfix tpr decode HEX --json` prints them.");
   const auto json = core::parse_json_strictly<nlohmann::ordered_json>(text);
   if (!json.ok()) throw BadInput(where + ": " + json.error().message);
-  const auto packed = is_packet_58(json.value()) ? packet_58_of(json.value()) : message_of(json.value(), baseline);
-  if (!packed.ok()) throw BadInput(where + ": " + packed.error().message);
-  std::cout << etcs::to_hex(packed.value()) << '\n';
+  const auto bytes = is_packet_58(json.value()) ? packet_58_of(json.value()) : message_of(json.value(), baseline);
+  if (!bytes.ok()) throw BadInput(where + ": " + bytes.error().message);
+  std::cout << etcs::to_hex(bytes.value()) << '\n';
   return 0;
 }
 
 struct TprOptions {
-  std::string hex;
+  std::vector<std::string> hex;
   std::string file;
   int baseline = 3;
   bool json = false;
@@ -253,7 +277,8 @@ void add_tpr(CLI::App& app, Action& chosen) {
   auto* decoder = tpr->add_subcommand(
       "decode",
       "Explain a message 136 or a packet 58, e.g. railfix tpr decode 880601D6F345402AF34000E48F68EB84D250014010C38830");
-  decoder->add_option("hex", options->hex, "The message, or the packet, in hexadecimal digits")->required();
+  decoder->add_option("hex", options->hex, "The message, or the packet, in hexadecimal digits, - = standard input")
+      ->required();
   decoder->add_flag("--json", options->json, "One JSON object with the raw values");
   add_baseline(decoder);
   decoder->callback([options, &chosen] {

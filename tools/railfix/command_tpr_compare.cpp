@@ -304,9 +304,13 @@ int compare_reports(const CompareOptions& options) {
         "figures\n",
         ours.left_out(), certified.left_out());
   }
-  if (pairing.ours.off_line + pairing.certified.off_line > 0) {
+  if (pairing.ours.off_line.size() + pairing.certified.off_line.size() > 0) {
     std::printf("group not on the line    ours %zu, certified %zu reports: not paired, but \"known\" as they say\n",
-                pairing.ours.off_line, pairing.certified.off_line);
+                pairing.ours.off_line.size(), pairing.certified.off_line.size());
+  }
+  if (pairing.outside_ours > 0) {
+    std::printf("beyond our log           %zu certified reports, from before it begins or after it ends: left out\n",
+                pairing.outside_ours);
   }
   std::printf("reports every            ours %s s, certified %s s\n",
               compare::figure("%.3g", pairing.ours.every_s).c_str(),

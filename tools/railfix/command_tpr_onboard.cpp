@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <iostream>
 #include <iterator>
 #include <memory>
 #include <sstream>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "command_tpr.hpp"
@@ -49,12 +51,16 @@ uint8_t index_of(const std::string& word, const Names& names, const std::string&
   throw core::BadInput(word + ": must be one of " + core::joined(names));
 }
 
-double number_of(const std::string& word, const std::string& value, double most) {
-  char* end = nullptr;
-  const double number = std::strtod(value.c_str(), &end);
-  if (value.empty() || *end != '\0' || !(number >= 0 && number <= most))
-    throw core::BadInput(word + ": must be a number from 0 to " + std::to_string(std::lround(most)));
-  return number;
+/// Metres may be broken, what counts or names may not.
+template <class Number>
+Number number_of(const std::string& word, const std::string& value, Number most) {
+  Number number = 0;
+  const char* end = value.data() + value.size();
+  const auto parsed = std::from_chars(value.data(), end, number);
+  if (parsed.ec == std::errc() && parsed.ptr == end && number >= 0 && number <= most) return number;
+  std::ostringstream said;
+  said << word << ": must be a " << (std::is_integral_v<Number> ? "whole " : "") << "number from 0 to " << most;
+  throw core::BadInput(said.str());
 }
 
 /// What the words have said so far.
@@ -66,8 +72,12 @@ class OnboardUnit {
   void hear(const std::string& line) {
     const OnboardUnit before = *this;
     std::istringstream stream(line);
+    std::vector<std::string> words{std::istream_iterator<std::string>(stream), {}};
+    // The group of a packet 58 may stand before it.
+    std::stable_partition(words.begin(), words.end(),
+                          [](const std::string& word) { return word.starts_with("packet_58="); });
     try {
-      for (std::string word; stream >> word;) take(word);
+      for (const std::string& word : words) take(word);
     } catch (const core::BadInput&) {
       *this = before;
       throw;
@@ -105,21 +115,21 @@ class OnboardUnit {
     } else if (name == "level") {
       status_.m_level(index_of(word, kLevels, value));
     } else if (name == "ntc") {
-      status_.nid_ntc(static_cast<uint8_t>(number_of(word, value, 255)));
+      status_.nid_ntc(static_cast<uint8_t>(number_of<uint32_t>(word, value, 255)));
     } else if (name == "integrity") {
       status_.q_integrity(index_of(word, kIntegrities, value));
       if (status_.q_integrity() == etcs::kConfirmedByDriver) status_.integrity_ns(core::wall_ns());
     } else if (name == "cab") {
       status_.active_cab(index_of(word, kCabs, value));
     } else if (name == "length") {
-      status_.train_length_m(number_of(word, value, 2000));
+      status_.train_length_m(number_of<double>(word, value, 2000));
     } else if (name == "report") {
       status_.wanted_because(static_cast<uint8_t>(msg::REPORT_BORDER + index_of(word, kReports, value)));
       status_.reports_wanted(next(status_.reports_wanted()));
     } else if (name == "packet_58") {
       take_packet_58(word, value);
     } else if (name == "lrbg") {
-      status_.packet_58_lrbg(static_cast<uint32_t>(number_of(word, value, etcs::kUnknownBaliseGroup)));
+      status_.packet_58_lrbg(number_of<uint32_t>(word, value, etcs::kUnknownBaliseGroup));
     } else {
       throw core::BadInput(word +
                            ": must be mode=, level=, ntc=, cab=, integrity=, length=, report=, packet_58= or lrbg=");
@@ -253,7 +263,7 @@ void add_tpr_onboard(CLI::App& tpr, Action& chosen) {
       "  ntc=NID_NTC   integrity=none, device, driver, lost   length=safe length in m, 0 = not known\n"
       "  cab=camera, other: at which end the active cab is, that of the camera or the other   report=border, session, "
       "error: a\n  report is wanted now   packet_58=HEX: position report parameters, none: they were deleted\n"
-      "  lrbg=NID_LRBG, behind packet_58: of the message that brought it; without it the LRBG of now\n"
+      "  lrbg=NID_LRBG, in one line with packet_58: of the message that brought it; without it the LRBG of now\n"
       "onboard_status is sent at every change and once a second until Ctrl-C. Lines of the same words on standard "
       "input\n"
       "change it. Silent for 3 s, tpr_publisher keeps mode and level and says nothing of train integrity.");
@@ -265,7 +275,9 @@ void add_tpr_onboard(CLI::App& tpr, Action& chosen) {
   command->callback([options, &chosen] {
     chosen = [options] {
       OnboardUnit unit;
-      for (const auto& word : options->words) unit.hear(word);
+      std::string line;
+      for (const auto& word : options->words) line += word + ' ';
+      unit.hear(line);
       return Station(*options).speak(unit);
     };
   });

@@ -145,6 +145,9 @@ class Sources {
     check_crs();
     const bool all_surveyed = surveyed_edges == map_.edges.size();
     map_.q_locacc_m = std::max(map_.q_locacc_m, all_surveyed ? kSurveyLocationM : kMappingLocationM);
+    for (BaliseGroup& group : map_.balise_groups) {
+      if (group.q_locacc_m == kUnsaidLocationM) group.q_locacc_m = options_.q_locacc_m;
+    }
     add_virtual_groups();
     if (!options_.landmarks.empty()) core::ok_or_throw(keep_landmarks(map_, options_.landmarks));
     tell_not_joined();

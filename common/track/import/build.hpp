@@ -22,6 +22,9 @@ struct BuildOptions {
   double virtual_balises_every_m = 0;             // 0 = none
   std::vector<std::string> virtual_balises_at{};  // "EDGE:OFFSET", besides these
   GroupNumbers virtual_numbers{};
+  /// Of balise groups whose source says none. A bound, not a sigma: ERTMS/ETCS's own where nothing is known
+  /// (Q_NVLOCACC, SUBSET-026 A.3.2), from which a trackside counts that has not said another one.
+  double q_locacc_m = 12;
   std::vector<std::string> landmarks{};  // kinds that are kept; empty = all
 };
 

@@ -38,13 +38,16 @@ struct TrackMark {
   std::string name;
 };
 
+/// Q_LOCACC of a group whose source does not say it: the builder's options do.
+inline constexpr double kUnsaidLocationM = 0;
+
 /// A balise group on one track, its balises at offsets of the same track.
 struct TrackGroup {
   uint32_t nid_c = 0;
   uint32_t nid_bg = 0;
   double offset_m = 0;
   bool nominal_is_forward = true;
-  double q_locacc_m = 0;
+  double q_locacc_m = kUnsaidLocationM;
   std::vector<TrackMark> balises;
 };
 

@@ -132,6 +132,44 @@ TEST_F(TprCommand, WhatIsSaidOfAnUnknownGroupGoesBothWaysAndIsTold) {
 
 TEST_F(TprCommand, SaysWhichBaselineWouldFit) {
   EXPECT_THAT(tpr({"decode", kCheckVector, "--baseline", "4"}).err, HasSubstr("--baseline 3"));
+  const auto file = file_with(tpr({"decode", kCheckVector, "--json"}).out);
+  const auto outcome = tpr({"encode", "--json", file, "--baseline", "4"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr(" It fits --baseline 3.\n"));
+}
+
+TEST_F(TprCommand, TakesHexAsItIsPasted) {
+  const std::string json = tpr({"decode", kCheckVector, "--json"}).out;
+  const std::string rest = std::string(kCheckVector).substr(6);
+  const auto said = [](std::vector<std::string> words) {
+    words.insert(words.begin(), "decode");
+    words.emplace_back("--json");
+    return tpr(words).out;
+  };
+  EXPECT_EQ(said({"0x" + std::string(kCheckVector)}), json);
+  EXPECT_EQ(said({"  " + std::string(kCheckVector) + "\n"}), json);
+  EXPECT_EQ(said({"88", "06", "01", rest}), json);
+  EXPECT_EQ(said({"0x88", "0x06 0x01", rest}), json);
+  const std::string piped = "echo '88 06 01 " + rest + "' | " RAILFIX_BIN_DIR "/railfix tpr decode - --json";
+  EXPECT_EQ(test::run_program({"/bin/sh", "-c", piped}, kPatienceS).out, json);
+}
+
+TEST_F(TprCommand, AnEmptyFileIsNamedSo) {
+  EXPECT_THAT(tpr({"encode", "--json", file_with("\n")}).err, HasSubstr(file_ + ": is empty; give the fields"));
+}
+
+TEST_F(TprCommand, TheGroupOfAPacket58MayStandBeforeIt) {
+  const auto said = [](const std::string& first, const std::string& second) {
+    return tpr({"onboard", first, second, "--train", "tpr-command", "--domain", "79", "--for-s", "0.1"});
+  };
+  const std::string packet = "packet_58=3A80908303E82103E9";
+  EXPECT_THAT(said("lrbg=1392643", packet).out, HasSubstr("packet 58 of 9 bytes from LRBG 1392643"));
+  EXPECT_THAT(said(packet, "lrbg=1392643").out, HasSubstr("packet 58 of 9 bytes from LRBG 1392643"));
+  EXPECT_THAT(said(packet, "lrbg=1392643.9").err,
+              HasSubstr("lrbg=1392643.9: must be a whole number from 0 to 16777215"));
+  EXPECT_THAT(said(packet, "ntc=1.9").err, HasSubstr("ntc=1.9: must be a whole number from 0 to 255"));
+  EXPECT_THAT(said(packet, "length=0x10").err, HasSubstr("length=0x10: must be a number from 0 to 2000"));
+  EXPECT_THAT(said(packet, "length=100.5").out, HasSubstr("length 100.5 m"));
 }
 
 }  // namespace

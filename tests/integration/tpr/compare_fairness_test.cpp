@@ -24,14 +24,20 @@ constexpr double kFirstStampS = 1000;
 constexpr double kSpacingM = 1000;
 constexpr int kLegs = 130;
 
-/// One group every kilometre.
+/// One group every kilometre, also of the track beside it: those have numbers from kBeside on.
+constexpr uint32_t kBeside = 9000;
 track::Map long_line() {
   track::Map map;
   const double length_m = (kLegs + 10) * kSpacingM;
-  map.edges = {{1, "main", 1, 2, "", track::Alignment::chained({0, 0, core::kPi / 2}, {{length_m, 0, 0}})}};
-  map.nodes = {{1, track::NodeKind::end, "", 0, 0}, {2, track::NodeKind::end, "", length_m, 0}};
+  map.edges = {{1, "main", 1, 2, "", track::Alignment::chained({0, 0, core::kPi / 2}, {{length_m, 0, 0}})},
+               {2, "beside", 3, 4, "", track::Alignment::chained({0, 4, core::kPi / 2}, {{length_m, 0, 0}})}};
+  map.nodes = {{1, track::NodeKind::end, "", 0, 0},
+               {2, track::NodeKind::end, "", length_m, 0},
+               {3, track::NodeKind::end, "", 0, 4},
+               {4, track::NodeKind::end, "", length_m, 4}};
   for (uint32_t i = 1; i * kSpacingM < length_m; ++i)
-    map.balise_groups.push_back({85, i, 1, i * kSpacingM, true, true, 1, {}});
+    for (const uint32_t edge : {1U, 2U})
+      map.balise_groups.push_back({85, edge == 1 ? i : kBeside + i, edge, i * kSpacingM, true, true, 1, {}});
   return map;
 }
 
@@ -40,10 +46,10 @@ uint32_t group_at(double place_m) {
 }
 
 /// A line of a table; `doubt_m` below 0 is not known.
-std::string line(double stamp_s, double front_m, double doubt_m, double speed_mps) {
+std::string line(double stamp_s, double front_m, double doubt_m, double speed_mps, uint32_t group_number_more = 0) {
   etcs::TrainPositionReport report;
   const uint32_t group = group_at(front_m);
-  report.nid_lrbg = 85U << 14U | group;
+  report.nid_lrbg = 85U << 14U | (group + group_number_more);
   report.q_scale = 0;
   report.d_lrbg = static_cast<uint32_t>(std::lround((front_m - group * kSpacingM) * 10));
   report.q_dirlrbg = report.q_dlrbg = report.q_dirtrain = etcs::kNominal;
@@ -89,20 +95,15 @@ class TprCompareFairness : public ::testing::Test {
   }
   [[nodiscard]] std::string said(const std::vector<std::string>& more = {},
                                  const std::string& start = "1:1000:+") const {
+    std::vector<std::string> arguments{"--map",   (folder_ / "line.map").string(), "--start", start,
+                                       "--truth", (folder_ / "truth").string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return said_without_map(arguments);
+  }
+  [[nodiscard]] std::string said_without_map(const std::vector<std::string>& more = {}) const {
     const auto file = [&](const char* name) { return (folder_ / name).string(); };
-    std::vector<std::string> arguments{"railfix",
-                                       "tpr",
-                                       "compare",
-                                       "--ours",
-                                       file("ours.csv"),
-                                       "--certified",
-                                       file("certified.csv"),
-                                       "--map",
-                                       file("line.map"),
-                                       "--start",
-                                       start,
-                                       "--truth",
-                                       file("truth")};
+    std::vector<std::string> arguments{
+        "railfix", "tpr", "compare", "--ours", file("ours.csv"), "--certified", file("certified.csv")};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const auto outcome = test::run_program(arguments, kPatienceS);
     return outcome.out + outcome.err;
@@ -239,6 +240,72 @@ TEST_F(TprCompareFairness, AStandstillCountsOnce) {
   const auto text = said({}, "1:1010:+");
   EXPECT_THAT(text, HasSubstr("repeats at standstill    6860 of 7560 pairs"));
   EXPECT_THAT(text, HasSubstr("verdict                  WORSE"));
+}
+
+/// At 30 m/s, a report a second with 5 % of the way since the group as doubt; `change` makes another one of it, or
+/// none.
+std::string steady_ride(const std::function<std::string(int second, double place_m, double since_m)>& change) {
+  std::string lines;
+  for (int t = 5; t < run_s(); ++t) {
+    const double place_m = kSpacingM + kMiddleMps * t;
+    lines += change(t, place_m, place_m - group_at(place_m) * kSpacingM);
+  }
+  return lines;
+}
+std::string good_line(int t, double place_m, double since_m) {
+  return line(t, place_m, 5 + 0.05 * since_m, kMiddleMps);
+}
+
+// Ours is as good as the certified system, and on the track beside for two thirds of each leg.
+TEST_F(TprCompareFairness, AnotherTrackIsNeverAsGood) {
+  write_truth([](double t) { return kMiddleMps * t; }, run_s());
+  write("certified.csv", steady_ride(good_line));
+  const auto ours = [](uint32_t more) {
+    return steady_ride([&](int t, double place_m, double since_m) {
+      return line(t, place_m, 5 + 0.05 * since_m, kMiddleMps, since_m > 300 ? more : 0);
+    });
+  };
+  write("ours.csv", ours(kBeside));
+  auto text = said();
+  EXPECT_THAT(text, HasSubstr("outside the interval     ours on 129 of 129, certified on 0 of 129 legs"));
+  EXPECT_THAT(text, HasSubstr("verdict                  WORSE; ours refers to groups of another track"));
+  text = said_without_map();
+  EXPECT_THAT(text, HasSubstr("not shown: on 129 legs ours refers to a group that cannot be compared"));
+  write("ours.csv", ours(5000));  // on no map
+  EXPECT_THAT(said(), HasSubstr("not shown: on 129 legs ours refers to a group that is not on the line"));
+  write("ours.csv", ours(0));
+  EXPECT_THAT(said(), HasSubstr("verdict                  at least as good"));
+  EXPECT_THAT(said_without_map(), HasSubstr("verdict                  intervals at least as good"));
+}
+
+// Ours is vaguer on the way, and silent there for little longer than it is carried.
+TEST_F(TprCompareFairness, SilenceWinsNothing) {
+  write_truth([](double t) { return kMiddleMps * t; }, run_s());
+  write("certified.csv", steady_ride(good_line));
+  const auto ours = [](double silent_from_m) {
+    return steady_ride([&](int t, double place_m, double since_m) {
+      return since_m >= silent_from_m ? "" : line(t, place_m, 3 + 0.07 * since_m, kMiddleMps);
+    });
+  };
+  write("ours.csv", ours(kSpacingM));
+  EXPECT_THAT(said(), HasSubstr("verdict                  WORSE"));
+  for (const auto& [silent_from_m, longest_gap_s] : {std::pair(30.0, "32.5"), std::pair(150.0, "28.5")}) {
+    write("ours.csv", ours(silent_from_m));
+    const auto text = said({"--longest-gap-s", longest_gap_s});
+    EXPECT_THAT(text, HasSubstr("not shown; ours is silent where it could be worse"));
+    EXPECT_THAT(text, HasSubstr("ours is silent for longer than --longest-gap-s"));
+  }
+}
+
+TEST_F(TprCompareFairness, ALogThatBeginsLaterShowsNothing) {
+  write_truth([](double t) { return kMiddleMps * t; }, run_s());
+  write("certified.csv", steady_ride(good_line));
+  write("ours.csv", steady_ride([](int t, double place_m, double since_m) {
+          return t < 1000 ? "" : good_line(t, place_m, since_m);
+        }));
+  const auto text = said();
+  EXPECT_THAT(text, HasSubstr("beyond our log           980 certified reports"));
+  EXPECT_THAT(text, HasSubstr("not shown: 980 of 4295 certified reports are from before ours begin"));
 }
 
 }  // namespace

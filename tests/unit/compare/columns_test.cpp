@@ -39,6 +39,26 @@ TEST(Columns, APromiseNeedsNoPartnerButATruthAndAnInterval) {
   EXPECT_EQ(certified, (std::vector<double>{0, 1}));
 }
 
+// E is on the siding, and A on the line; the group 9 is on no map.
+TEST(Columns, AGroupOfAnotherTrackIsABrokenPromiseWhereTheOtherSideIsRight) {
+  const auto truth = steady();
+  const Axes line(track::Path::follow(balise_map(), forward(1, 0), 900, 0).value());
+  const auto judged = [&](uint32_t group, double certified_m) {
+    const auto pairing = pair_up({report(0, kA, -100), report(5, group, 100)},
+                                 {report(0, kA, -100), report(4, kA, certified_m - 100)}, line, kGapNs);
+    return columns_of(pairing, Judge{&truth, 0});
+  };
+  const auto broken = [](const Columns& found) {
+    size_t count = 0;
+    for (const auto& sample : found.outside) count += sample.ours > 0;
+    return count;
+  };
+  EXPECT_EQ(broken(judged(kE, 80)), 1U);
+  EXPECT_EQ(judged(kE, 80).ours_other_track, 1U);
+  EXPECT_EQ(broken(judged(kE, 300)), 0U) << "perhaps it is the line that is wrong";
+  EXPECT_EQ(broken(judged(85U << 14U | 9U, 80)), 0U) << "nobody knows where that is";
+}
+
 TEST(Columns, AStandstillIsItsFirstAndItsLast) {
   std::vector<TimedReport> reports;
   for (int i = 0; i < 10; ++i) reports.push_back(report(i, kA, 20 * i));

@@ -180,7 +180,54 @@ TEST(Doubts, OursMayReportMoreOftenButNotMoreSeldom) {
   EXPECT_TRUE(seldom(6, 1));
   EXPECT_FALSE(seldom(1, 6));
   EXPECT_FALSE(seldom(6.5, 6));
-  EXPECT_FALSE(seldom(NAN, 1)) << "only reports of the same time are paired";
+  EXPECT_TRUE(seldom(NAN, 1)) << "what is never said is said seldom";
+  EXPECT_FALSE(seldom(NAN, NAN)) << "only reports of the same time are paired";
+}
+
+// Of each leg of ten.
+TEST(Doubts, AnotherTrackOrGroupInSomeReportsOfALegIsOne) {
+  const auto doubts = [](size_t of_leg, size_t every, const Axes& axes) {
+    std::vector<TimedReport> ours;
+    std::vector<TimedReport> certified;
+    for (size_t i = 0; i < 400; ++i) {
+      certified.push_back(
+          report(static_cast<double>(i), i / 10 % 2 == 0 ? kA : kC, 20.0 * static_cast<double>(i % 10)));
+      ours.push_back(certified.back());
+      if (i / 10 % every == 0 && i % 10 >= 4 && i % 10 < 4 + of_leg) ours.back().fields.nid_lrbg = kE;
+    }
+    return doubts_of(pair_up(ours, certified, axes, kGapNs), std::nullopt, 0);
+  };
+  const Axes line(track::Path::follow(balise_map(), forward(1, 0), 900, 0).value());
+  EXPECT_EQ(doubts(4, 1, line).off_line, 40U);
+  EXPECT_EQ(doubts(2, 40, line).off_line, 1U);
+  EXPECT_EQ(doubts(1, 1, line).off_line, 40U) << "one of ten";
+  EXPECT_EQ(doubts(1, 40, line).off_line, 0U) << "one of 400 proves nothing";
+  EXPECT_EQ(doubts(4, 1, Axes()).other_groups, 40U);
+  EXPECT_EQ(doubts(4, 1, Axes()).off_line, 0U);
+  EXPECT_EQ(doubts(0, 1, line).off_line + doubts(0, 1, Axes()).other_groups, 0U);
+}
+
+TEST(Doubts, ASilenceOfOneReportInTwentyIsNone) {
+  const auto silent = [](size_t reports, size_t heard) {
+    Doubts doubts;
+    doubts.silent = reports;
+    doubts.heard = heard;
+    return doubts.ours_silent();
+  };
+  EXPECT_FALSE(silent(0, 0));
+  EXPECT_FALSE(silent(5, 100));
+  EXPECT_TRUE(silent(6, 100));
+}
+
+TEST(Doubts, LogsOfOtherTimesAreOne) {
+  std::vector<TimedReport> certified;
+  for (int i = 0; i < 1000; ++i) certified.push_back(report(i, kA, i));
+  const auto other_times = [&](int from) {
+    const auto pairing = pair_up({certified.begin() + from, certified.end()}, certified, Axes(), kGapNs);
+    return doubts_of(pairing, std::nullopt, 0).other_times();
+  };
+  EXPECT_FALSE(other_times(20));
+  EXPECT_TRUE(other_times(200));
 }
 
 }  // namespace

@@ -190,5 +190,16 @@ TEST(Gamab, TheConfidenceHoldsForSharesToo) {
   }
 }
 
+TEST(Gamab, NoErrorAtAllIsAsGoodAsNone) {
+  std::vector<Sample> samples;
+  for (size_t leg = 0; leg < 9; ++leg) samples.push_back({leg, 0, 0});
+  EXPECT_EQ(compare_ratio(samples, Figure::root_mean_square, {}).verdict, Verdict::open) << "too few legs";
+  samples.push_back({9, 0, 0});
+  const auto result = compare_ratio(samples, Figure::root_mean_square, {});
+  EXPECT_EQ(result.verdict, Verdict::at_least_as_good);
+  EXPECT_EQ(result.ratio, 1);
+  EXPECT_EQ(result.high, 1);
+}
+
 }  // namespace
 }  // namespace railfix::compare

@@ -112,7 +112,7 @@ TEST(Pairing, NeedsOursBeforeAndBehindOnTheSameAxis) {
 TEST(Pairing, TellsWhoHadAKnownInterval) {
   auto no_interval = report(40, kA, 500);
   no_interval.fields.l_doubtover = etcs::kUnknownDistance;
-  const auto pairing = pair_up({report(0, kA, 0), no_interval},
+  const auto pairing = pair_up({report(0, kA, 0), no_interval, lost(60)},
                                {report(-1, kA, 0), report(1, kA, 20), report(15, kA, 300), report(16, kA, 320),
                                 report(41, kA, 520), lost(50), report(60, kB, 0)},
                                Axes(), kGapNs);
@@ -145,9 +145,9 @@ TEST(Pairing, AHoleInTheMapIsNoFaultOfTheReports) {
   for (const auto& at : pairing.availability)
     seen.push_back(static_cast<int>(100 * at.leg) + (at.ours ? 10 : 0) + (at.certified ? 1 : 0));
   EXPECT_EQ(seen, (std::vector<int>{11, 101, 111, 211}));
-  EXPECT_EQ(pairing.ours.off_line, 1U);
+  EXPECT_EQ(pairing.ours.off_line.size(), 1U);
   EXPECT_EQ(pairing.ours.placed.size(), 1U);
-  EXPECT_EQ(pairing.certified.off_line, 2U);
+  EXPECT_EQ(pairing.certified.off_line.size(), 2U);
   EXPECT_EQ(pairing.certified.placed.size(), 2U);
   EXPECT_EQ(pairing.legs, 1U);
 }
@@ -265,6 +265,82 @@ TEST(OtherFields, AreCountedWhereTheyDiffer) {
   EXPECT_EQ(other.integrity, 1U);
   EXPECT_EQ(other.both_lengths, 4U);
   EXPECT_NEAR(other.longer_m, 3, 0.1) << "it has run 10 m since";
+}
+
+/// Ours at each certified report with a position.
+std::vector<Beside> beside(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified,
+                           const Axes& axes) {
+  std::vector<Beside> found;
+  for (const auto& at : pair_up(ours, certified, axes, kGapNs).beside) found.push_back(at.ours);
+  return found;
+}
+
+TEST(Pairing, WhatCannotBeComparedIsNoSilence) {
+  const Axes line(track::Path::follow(balise_map(), forward(1, 0), 900, 0).value());
+  const std::vector<TimedReport> certified{report(0, kA, 0), report(1, kA, 20), report(2, kA, 40), report(3, kB, 0),
+                                           report(4, kB, 20)};
+  // E is on the siding.
+  EXPECT_EQ(
+      beside({report(0, kA, 0), report(1, kE, 0), report(2, kE, 20), lost(3), report(5, kB, 40)}, certified, line),
+      (std::vector<Beside>{Beside::paired, Beside::off_line, Beside::off_line, Beside::unknown, Beside::unknown}));
+  // Now here, now there: on the line whenever the certified system reports.
+  EXPECT_EQ(beside({report(0.9, kA, 18), report(1.5, kE, 0), report(1.9, kA, 38), report(2.5, kE, 0)},
+                   {report(1, kA, 20), report(2, kA, 40)}, line),
+            (std::vector<Beside>{Beside::off_line, Beside::off_line}));
+  // Without a map each group is alone; ours comes to B a report later, or says C instead.
+  EXPECT_EQ(beside({report(0, kA, 0), report(2, kA, 40), report(3, kA, 60), report(4, kB, 20)}, certified, Axes()),
+            (std::vector<Beside>{Beside::paired, Beside::paired, Beside::paired, Beside::passing, Beside::paired}));
+  EXPECT_EQ(beside({report(0, kA, 0), report(1, kC, 20), report(4, kC, 80)}, certified, Axes()),
+            (std::vector<Beside>{Beside::paired, Beside::other_group, Beside::other_group, Beside::other_group,
+                                 Beside::other_group}));
+}
+
+TEST(Pairing, WhatIsNotCarriedIsSilence) {
+  const std::vector<TimedReport> certified{report(0, kA, 0), report(1, kA, 20), report(10, kA, 200),
+                                           report(18, kA, 360)};
+  EXPECT_EQ(beside({report(0, kA, 0), report(17, kA, 340), report(18, kA, 360)}, certified, Axes()),
+            (std::vector<Beside>{Beside::paired, Beside::silent, Beside::silent, Beside::paired}));
+  EXPECT_EQ(beside({report(0, kA, 0), lost(2), report(18, kA, 360)}, certified, Axes()),
+            (std::vector<Beside>{Beside::paired, Beside::silent, Beside::unknown, Beside::paired}));
+}
+
+// Ours begins 20 s later and ends 20 s sooner.
+TEST(Pairing, WhatLiesBeyondOurLogIsNoFaultOfTheSystem) {
+  std::vector<TimedReport> ours;
+  std::vector<TimedReport> certified;
+  for (int i = 0; i < 100; ++i) {
+    certified.push_back(report(i, kA, 20 * i));
+    if (i >= 20 && i < 80) ours.push_back(certified.back());
+  }
+  const auto pairing = pair_up(ours, certified, Axes(), kGapNs);
+  EXPECT_EQ(pairing.outside_ours, 10U) << "by more than is carried";
+  EXPECT_EQ(pairing.availability.size(), 90U);
+  EXPECT_EQ(pairing.alone, 30U);
+}
+
+/// Every second for `length_s`, but for those that are left out.
+template <class Left>
+std::vector<TimedReport> every_second(int length_s, Left left_out) {
+  std::vector<TimedReport> reports;
+  for (int i = 0; i < length_s; ++i) {
+    if (!left_out(i)) reports.push_back(report(i, kA, i));
+  }
+  return reports;
+}
+
+TEST(Pairing, ASilenceCountsWholeAndANightBetweenRidesForNobody) {
+  const auto gaps = [](auto left_out, auto certified_left_out) {
+    const auto pairing =
+        pair_up(every_second(100'000, left_out), every_second(100'000, certified_left_out), Axes(), kGapNs);
+    return std::pair(pairing.ours.every_s, pairing.certified.every_s);
+  };
+  const auto night = [](int i) { return i > 1000 && i < 99'000; };
+  EXPECT_EQ(gaps(night, night), (std::pair(1.0, 1.0)));
+  const auto seldom = gaps([&](int i) { return night(i) || i % 20 > 3; }, night);  // 1, 1, 1 and 17 s
+  EXPECT_NEAR(seldom.first, (3 + 17 * 17) / 20.0, 0.2);
+  EXPECT_EQ(seldom.second, 1);
+  const auto once = gaps([&](int i) { return night(i) || i % 20 > 0; }, night);
+  EXPECT_NEAR(once.first, 20, 0.2);
 }
 
 }  // namespace

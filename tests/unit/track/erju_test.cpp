@@ -242,6 +242,7 @@ TEST_F(ErjuTest, BalisesOffTheirTrackEdgeAreLeftOutAndTold) {
   EXPECT_EQ(map.balise_groups[0].nid_bg, 3U);
   EXPECT_EQ(map.balise_groups[0].offset_m, 200);
   EXPECT_EQ(map.balise_groups[0].balises.size(), 1U);
+  EXPECT_EQ(map.balise_groups[0].q_locacc_m, 12) << "the file says none";
   EXPECT_THAT(marks_of(map, {LandmarkKind::balise}), ElementsAre("balise x2 at 2.0 on 1", "balise x200 at 200.0 on 1"));
   for (const char* balise : {"x-50", "x400", "x301", "x-1"})
     EXPECT_THAT(map.problems,

@@ -54,6 +54,16 @@ TEST_F(RailmlBalises, GroupsOfRailml3HaveTheDirectionThatTheFileSays) {
             "b at 100.0, nominal reverse");
 }
 
+// A bound that the trackside counts with, not the sigma of the landmarks.
+TEST_F(RailmlBalises, WhatTheFileDoesNotSayOfLocationAccuracyTheBuilderIsTold) {
+  const auto file = write("a.railml", railml3(balise("b", "100") + group3("mileageDirection=\"nominal\"")));
+  const auto accuracy_m = [&](const BuildOptions& options) {
+    return core::value_or_throw(build_map({file}, options)).map.balise_groups.at(0).q_locacc_m;
+  };
+  EXPECT_EQ(accuracy_m({}), 12) << "Q_NVLOCACC";
+  EXPECT_EQ(accuracy_m({.q_locacc_m = 5}), 5);
+}
+
 // The mileage that mileageDirection speaks of may fall along the net element, and the place may be told against it.
 TEST_F(RailmlBalises, DirectionsTurnWithTheNetElement) {
   const auto along_mileage = [](const std::string& things, const std::string& begin_m, const std::string& end_m) {

@@ -46,6 +46,10 @@ double Judge::outside(const PlacedReport& report) const {
   return std::isfinite(report.high_m - report.low_m) ? 0 : evaluation::kUnknown;
 }
 
+bool Judge::on_other_track(const OffLine& report) const {
+  return report.other_track && report.other && truth->at(report.stamp_ns) && outside(*report.other) == 0;
+}
+
 std::vector<Pair> without_repeats(const std::vector<Pair>& pairs) {
   return first_and_last(pairs);
 }
@@ -65,6 +69,16 @@ Columns columns_of(const Pairing& pairing, const std::optional<Judge>& judge) {
     columns.outside.push_back({leg, judge->outside(report), evaluation::kUnknown});
   for (const auto& [leg, report] : pairing.certified.placed)
     columns.outside.push_back({leg, evaluation::kUnknown, judge->outside(report)});
+  for (const auto& report : pairing.ours.off_line) {
+    if (!judge->on_other_track(report)) continue;
+    columns.outside.push_back({report.leg, 1, evaluation::kUnknown});
+    ++columns.ours_other_track;
+  }
+  for (const auto& report : pairing.certified.off_line) {
+    if (!judge->on_other_track(report)) continue;
+    columns.outside.push_back({report.leg, evaluation::kUnknown, 1});
+    ++columns.certified_other_track;
+  }
   return columns;
 }
 

@@ -19,15 +19,21 @@ struct Judge {
   [[nodiscard]] double error_m(const PlacedReport& report) const;
   /// As compare_broken() takes it. An interval with an open end promises too little to count as kept.
   [[nodiscard]] double outside(const PlacedReport& report) const;
+  /// It names a group of another track, at a time at which the other side is on the line and right: there the line is
+  /// the true way. As `railfix evaluate` has it, the wrong group is a broken promise.
+  [[nodiscard]] bool on_other_track(const OffLine& report) const;
 };
 
 /// Of a standstill the first and the last: those between say the same again.
 std::vector<Pair> without_repeats(const std::vector<Pair>& pairs);
 
 struct Columns {
-  std::vector<Sample> lengths;    // of pairs without repeats, ours as it was sent last
-  std::vector<Sample> errors;     // of the same
-  std::vector<Sample> outside;    // of all reports with a place: a promise needs no partner
+  std::vector<Sample> lengths;  // of pairs without repeats, ours as it was sent last
+  std::vector<Sample> errors;   // of the same
+  std::vector<Sample> outside;  // of all reports with a place: a promise needs no partner
+  /// Reports among those that are outside because they name a group of another track.
+  size_t ours_other_track = 0;
+  size_t certified_other_track = 0;
   std::vector<Sample> available;  // 1 = a report with a known interval; repeats count where one side's changes
 };
 Columns columns_of(const Pairing& pairing, const std::optional<Judge>& judge);

@@ -16,6 +16,7 @@ constexpr double kSeldom = 1.1;
 constexpr double kSigmas = 3;
 constexpr double kLeastShiftS = 1e-3;  // rounding alone is no shift
 constexpr double kChance = 0.01;       // of all pairs
+constexpr double kMostSilent = 0.05;   // of certified reports, as the margin of what is known
 constexpr double kSmall = 0.2;         // a fifth of the error makes 2 % of its root mean square
 
 /// What a shift of the stamps is held against: the certified system's error, or without a truth half its interval.
@@ -60,6 +61,19 @@ class Contradicted {
   std::map<size_t, std::pair<size_t, size_t>> legs_;  // pairs, and those that contradict
 };
 
+void look_beside(const std::vector<BesideCertified>& beside, Doubts& doubts) {
+  Contradicted off_line(beside.size());
+  Contradicted other_groups(beside.size());
+  for (const auto& [leg, ours] : beside) {
+    off_line.add(leg, ours == Beside::off_line);
+    other_groups.add(leg, ours == Beside::other_group);
+    doubts.silent += ours == Beside::silent;
+    doubts.heard += ours != Beside::unknown;
+  }
+  doubts.off_line = off_line.legs();
+  doubts.other_groups = other_groups.legs();
+}
+
 /// Where the driver changes the cab or the train sets back the two may say so one report apart.
 bool beside_change(const std::vector<Pair>& pairs, size_t i, double PlacedReport::*way) {
   const auto changes = [&](size_t before, size_t after) {
@@ -73,7 +87,15 @@ bool beside_change(const std::vector<Pair>& pairs, size_t i, double PlacedReport
 }  // namespace
 
 bool Doubts::ours_seldom() const {
-  return ours_every_s > kSeldom * certified_every_s;
+  return !std::isnan(certified_every_s) && !(ours_every_s <= kSeldom * certified_every_s);
+}
+
+bool Doubts::ours_silent() const {
+  return static_cast<double>(silent) > kMostSilent * static_cast<double>(heard);
+}
+
+bool Doubts::other_times() const {
+  return static_cast<double>(outside) > kChance * static_cast<double>(in_all);
 }
 
 TimeShift shift_to_truth(const std::vector<Pair>& pairs, const Judge& judge) {
@@ -98,13 +120,17 @@ Doubts doubts_of(const Pairing& pairing, const std::optional<Judge>& judge, doub
     runs_apart.add(pair.leg, pair.runs_apart() && !beside_change(pairs, i, &PlacedReport::running));
     speeds_apart.add(pair.leg, pair.speeds_apart());
   }
-  return {apart.size(),
-          turned.legs(),
-          runs_apart.legs(),
-          speeds_apart.legs(),
-          stamps_off(without_repeats(pairs), judge, offset_s),
-          pairing.ours.every_s,
-          pairing.certified.every_s};
+  Doubts doubts{.apart = apart.size(),
+                .turned = turned.legs(),
+                .runs_apart = runs_apart.legs(),
+                .speeds_apart = speeds_apart.legs(),
+                .stamps = stamps_off(without_repeats(pairs), judge, offset_s),
+                .outside = pairing.outside_ours,
+                .in_all = pairing.availability.size() + pairing.outside_ours,
+                .ours_every_s = pairing.ours.every_s,
+                .certified_every_s = pairing.certified.every_s};
+  look_beside(pairing.beside, doubts);
+  return doubts;
 }
 
 }  // namespace railfix::compare

@@ -20,11 +20,22 @@ struct Doubts {
   size_t runs_apart = 0;            // the same of the way that it runs
   size_t speeds_apart = 0;          // V_TRAIN
   std::optional<StampsOff> stamps;  // by more than chance, and so much that it matters
-  double ours_every_s = 0;          // Counted::every_s
+  size_t off_line = 0;              // of a certified report on the line, ours refers to a group that is not on it
+  size_t other_groups = 0;          // ours refers to a group from which nothing leads to the certified one
+  // Certified reports.
+  size_t silent = 0;   // ours, known a moment ago, cannot be carried to them
+  size_t heard = 0;    // ... and all at which ours was known a moment ago
+  size_t outside = 0;  // from before our log begins or after it ends
+  size_t in_all = 0;
+  double ours_every_s = 0;  // Counted::every_s
   double certified_every_s = 0;
   /// What ours said last is held against a fresh certified report; sent behind each group only, it is always good. The
   /// other way round nothing is gained: at the time of a certified report, ours of a moment ago is compared.
   [[nodiscard]] bool ours_seldom() const;
+  /// Left out where it is silent: what is compared is what ours chose to say.
+  [[nodiscard]] bool ours_silent() const;
+  /// The logs are of other times.
+  [[nodiscard]] bool other_times() const;
 };
 
 /// `offset_s` is in the certified stamps already. The truth judges the pairs it covers and the certified stamps;

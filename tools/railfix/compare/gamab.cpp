@@ -146,9 +146,15 @@ RatioResult compare_ratio(const std::vector<Sample>& samples, Figure figure, con
   if (legs.empty()) return result;
   Leg all;
   for (const auto& leg : legs) all = all + leg;
-  if (all.ours == 0 && all.certified == 0) return result;
-  result.ratio = ratio_of(all, figure);
+  const bool nothing = all.ours == 0 && all.certified == 0;
+  if (nothing && figure == Figure::share) return result;
+  result.ratio = nothing ? 1 : ratio_of(all, figure);
   if (legs.size() < kFewestLegs) return result;
+  if (nothing) {  // no error at all is as good as none
+    result.low = result.high = 1;
+    result.verdict = Verdict::at_least_as_good;
+    return result;
+  }
   const auto bounds = bounds_of(legs, figure, demand.confidence);
   result.low = bounds.low;
   result.high = bounds.high;

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "core/time.hpp"
 #include "core/units.hpp"
+#include "evaluation/truth.hpp"
 
 namespace railfix::compare {
 
@@ -65,15 +65,21 @@ void compare_speeds(const PlacedReport& last, const PlacedReport& next, Pair& pa
 
 struct Said {
   int64_t stamp_ns = 0;
+  bool position_known = false;
   bool interval_known = false;
+  uint64_t system = 0;
   std::optional<PlacedReport> place;
 };
 
-Said said(const TimedReport& report, const Axes& axes, size_t leg, Counted& counted) {
-  Said said{report.stamp_ns, interval_known(report.fields), axes.place(report)};
-  if (said.place) counted.placed.push_back({leg, *said.place});
-  counted.off_line += !said.place && position_known(report.fields);
-  return said;
+std::vector<Said> said(const std::vector<TimedReport>& reports, const Axes& axes) {
+  std::vector<Said> all;
+  all.reserve(reports.size());
+  for (const auto& report : reports) {
+    const auto& fields = report.fields;
+    all.push_back({report.stamp_ns, position_known(fields), interval_known(fields), co_ordinate_system(fields),
+                   axes.place(report)});
+  }
+  return all;
 }
 
 /// Of every certified report: it begins where the LRBG changes.
@@ -134,18 +140,68 @@ Around around(const std::vector<Said>& reports, int64_t stamp_ns) {
   return found;
 }
 
-double every_s(const std::vector<TimedReport>& reports, int64_t from_ns, int64_t to_ns, int64_t longest_gap_ns) {
+/// When the certified system reports: its gaps that can be carried over, in the time of both logs.
+std::vector<evaluation::Stretch> reported(const std::vector<TimedReport>& ours,
+                                          const std::vector<TimedReport>& certified, int64_t longest_gap_ns) {
+  std::vector<evaluation::Stretch> stretches;
+  if (ours.empty() || certified.empty()) return stretches;
+  for (size_t i = 1; i < certified.size(); ++i) {
+    if (certified[i].stamp_ns - certified[i - 1].stamp_ns > longest_gap_ns) continue;
+    const evaluation::Stretch both{std::max(certified[i - 1].stamp_ns, ours.front().stamp_ns),
+                                   std::min(certified[i].stamp_ns, ours.back().stamp_ns)};
+    if (both.from_ns < both.to_ns) stretches.push_back(both);
+  }
+  return stretches;
+}
+
+double every_s(const std::vector<TimedReport>& reports, const std::vector<evaluation::Stretch>& stretches) {
   double sum_s = 0;
   double squares = 0;
+  auto first = stretches.begin();
   for (size_t i = 1; i < reports.size(); ++i) {
     const int64_t begin_ns = reports[i - 1].stamp_ns;
     const int64_t end_ns = reports[i].stamp_ns;
-    if (begin_ns < from_ns || end_ns > to_ns || end_ns - begin_ns > longest_gap_ns) continue;
-    const double gap_s = core::seconds(end_ns - begin_ns);
+    while (first != stretches.end() && first->to_ns <= begin_ns) ++first;
+    double gap_s = 0;
+    for (auto at = first; at != stretches.end() && at->from_ns < end_ns; ++at)
+      gap_s += core::seconds(std::min(end_ns, at->to_ns) - std::max(begin_ns, at->from_ns));
     sum_s += gap_s;
     squares += gap_s * gap_s;
   }
   return squares / sum_s;
+}
+
+bool comparable(const Said& a, const Said& b) {
+  return a.place && b.place && a.place->axis == b.place->axis;
+}
+
+/// A group that the map lacks is no fault of the reports.
+bool name_the_same(const Said& a, const Said& b) {
+  return a.position_known && b.position_known && a.system == b.system;
+}
+
+/// With one of three certified reports in a row.
+bool has_in_common(const Said& ours, const std::vector<Said>& certified, size_t middle) {
+  const size_t last = std::min(middle + 1, certified.size() - 1);
+  for (size_t i = middle - std::min<size_t>(middle, 1); i <= last; ++i) {
+    if (comparable(ours, certified[i]) || name_the_same(ours, certified[i])) return true;
+  }
+  return false;
+}
+
+/// Of a certified report with a position that has no partner.
+Beside beside_alone(const Around& ours, const std::vector<Said>& certified, size_t i, int64_t longest_gap_ns) {
+  const auto* last = ours.last;
+  const auto* next = ours.next;
+  const bool lately = last != nullptr && certified[i].stamp_ns - last->stamp_ns <= longest_gap_ns;
+  if (!lately || !last->position_known) return Beside::unknown;
+  const auto is_off_line = [&](const Said& one) {
+    return one.position_known && !one.place && !has_in_common(one, certified, i);
+  };
+  if (certified[i].place && (is_off_line(*last) || (next != nullptr && is_off_line(*next)))) return Beside::off_line;
+  if (next != nullptr && (!next->position_known || next->stamp_ns - last->stamp_ns > longest_gap_ns))
+    return Beside::silent;
+  return has_in_common(*last, certified, i) ? Beside::passing : Beside::other_group;
 }
 
 /// Ours at the time of a certified report.
@@ -163,6 +219,19 @@ std::optional<Pair> paired(const Around& ours, const PlacedReport& certified, in
   pair.ours_sent = last;
   compare_speeds(last, next, pair);
   return pair;
+}
+
+/// Places of one side, and what it says of groups that the line does not have.
+void count(const std::vector<TimedReport>& reports, const std::vector<Said>& said, const std::vector<Said>& others,
+           const Axes& axes, int64_t longest_gap_ns, const std::function<size_t(size_t)>& leg_of, Counted& counted) {
+  for (size_t i = 0; i < said.size(); ++i) {
+    if (said[i].place) counted.placed.push_back({leg_of(i), *said[i].place});
+    if (said[i].place || !said[i].position_known) continue;
+    const auto* other = around(others, said[i].stamp_ns).last;
+    const bool lately = other != nullptr && said[i].stamp_ns - other->stamp_ns <= longest_gap_ns;
+    counted.off_line.push_back(
+        {leg_of(i), said[i].stamp_ns, axes.names_other_track(reports[i].fields), lately ? other->place : std::nullopt});
+  }
 }
 
 }  // namespace
@@ -193,33 +262,39 @@ Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedRep
   Pairing pairing;
   const auto legs = legs_of(certified);
   const auto stays = stays_of(certified);
-  std::vector<Said> own;
-  own.reserve(ours.size());
-  for (const auto& report : ours)
-    own.push_back(said(report, axes, leg_at(report.stamp_ns, certified, legs), pairing.ours));
-  for (size_t i = 0; i < certified.size(); ++i) {
-    const auto& timed = certified[i];
-    const size_t leg = legs[i];
-    const auto report = said(timed, axes, leg, pairing.certified);
-    const auto beside = around(own, timed.stamp_ns);
-    const bool fresh = beside.last != nullptr && timed.stamp_ns - beside.last->stamp_ns <= longest_gap_ns;
-    pairing.availability.push_back({leg, stays[i], fresh && beside.last->interval_known, report.interval_known});
-    if (!report.place) continue;
-    auto pair = paired(beside, *report.place, longest_gap_ns);
-    if (!pair) {
-      ++pairing.alone;
+  const auto own = said(ours, axes);
+  const auto theirs = said(certified, axes);
+  const auto leg_of_ours = [&](size_t i) { return leg_at(ours[i].stamp_ns, certified, legs); };
+  count(ours, own, theirs, axes, longest_gap_ns, leg_of_ours, pairing.ours);
+  count(
+      certified, theirs, own, axes, longest_gap_ns, [&](size_t i) { return legs[i]; }, pairing.certified);
+  for (size_t i = 0; i < theirs.size(); ++i) {
+    const Said& report = theirs[i];
+    const int64_t stamp_ns = report.stamp_ns;
+    const bool outside = !own.empty() && (stamp_ns < own.front().stamp_ns - longest_gap_ns ||
+                                          stamp_ns > own.back().stamp_ns + longest_gap_ns);
+    if (outside) {  // a log that begins late or ends early says nothing about the system
+      ++pairing.outside_ours;
       continue;
     }
-    pair->leg = leg;
+    const auto beside = around(own, stamp_ns);
+    const bool fresh = beside.last != nullptr && stamp_ns - beside.last->stamp_ns <= longest_gap_ns;
+    pairing.availability.push_back({legs[i], stays[i], fresh && beside.last->interval_known, report.interval_known});
+    if (!report.position_known) continue;
+    auto pair = report.place ? paired(beside, *report.place, longest_gap_ns) : std::nullopt;
+    pairing.beside.push_back({legs[i], pair ? Beside::paired : beside_alone(beside, theirs, i, longest_gap_ns)});
+    if (!pair) {
+      pairing.alone += report.place.has_value();
+      continue;
+    }
+    pair->leg = legs[i];
     pair->stay = stays[i];
-    pairing.legs += pairing.pairs.empty() || pairing.pairs.back().leg != leg;
+    pairing.legs += pairing.pairs.empty() || pairing.pairs.back().leg != legs[i];
     pairing.pairs.push_back(*pair);
   }
-  if (ours.empty() || certified.empty()) return pairing;
-  const int64_t from_ns = std::max(ours.front().stamp_ns, certified.front().stamp_ns);
-  const int64_t to_ns = std::min(ours.back().stamp_ns, certified.back().stamp_ns);
-  pairing.ours.every_s = every_s(ours, from_ns, to_ns, longest_gap_ns);
-  pairing.certified.every_s = every_s(certified, from_ns, to_ns, longest_gap_ns);
+  const auto stretches = reported(ours, certified, longest_gap_ns);
+  pairing.ours.every_s = every_s(ours, stretches);
+  pairing.certified.every_s = every_s(certified, stretches);
   return pairing;
 }
 

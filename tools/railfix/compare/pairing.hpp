@@ -1,7 +1,9 @@
 // Two systems' reports at the same times: ours are carried to the time of each certified one by the reported speeds.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "compare/placed_report.hpp"
@@ -44,22 +46,47 @@ struct OnLeg {
   PlacedReport report;
 };
 
+/// With a position, but relative to a group that the line does not have.
+struct OffLine {
+  size_t leg = 0;
+  int64_t stamp_ns = 0;
+  bool other_track = false;           // the map has that group elsewhere
+  std::optional<PlacedReport> other;  // what the other side said last, not long ago and on the line
+};
+
+/// What ours is at the time of a certified report with a position.
+enum class Beside : uint8_t {
+  paired,
+  unknown,      // no position, or none lately: that is a matter of Availability
+  silent,       // a position, but the next one comes too late to carry it, or is unknown: nothing to compare with
+  off_line,     // the last or the next counts from a group that is not on the line, and the certified one is on it
+  other_group,  // a position that cannot be compared
+  passing,      // the two change to the next group one report apart, or name the same group, which the map lacks
+};
+struct BesideCertified {
+  size_t leg = 0;
+  Beside ours = Beside::unknown;
+};
+
 /// Reports of one side.
 struct Counted {
   std::vector<OnLeg> placed;  // paired or not; the leg is that of the certified report at or before it
-  size_t off_line = 0;        // with a position, but relative to a group that the line does not have
-  /// Length of the gap between reports that a moment lies in, on average over the time that both report. Gaps that
-  /// nothing is carried over are left out; NaN when there are no others.
+  std::vector<OffLine> off_line;
+  /// Length of the gap between reports that a moment lies in, on average over the time that the certified system
+  /// reports and both logs have; NaN when there is none. It reports where its gaps can be carried over: a night between
+  /// two rides counts for nobody, and a silence of ours in a ride counts whole.
   double every_s = 0;
 };
 
 struct Pairing {
   std::vector<Pair> pairs;
-  std::vector<Availability> availability;  // of every certified report, those without a place included
+  std::vector<Availability> availability;  // of every certified report in our log, those without a place included
+  std::vector<BesideCertified> beside;     // of every one of them with a position, on the line or not
   size_t legs = 0;                         // that have pairs
   Counted ours;
   Counted certified;
-  size_t alone = 0;  // placed certified reports without one of ours before and behind
+  size_t alone = 0;         // placed certified reports in our log without one of ours before and behind
+  size_t outside_ours = 0;  // certified reports from before our log begins or after it ends, by more than a gap
 };
 
 /// Ours are carried between two reports on the same axis that follow each other and are at most `longest_gap_ns` apart.

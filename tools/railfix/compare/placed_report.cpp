@@ -29,12 +29,6 @@ double running(const etcs::TrainPositionReport& fields) {
   return way == etcs::kReverse ? -1 : 1;
 }
 
-/// The LRBG in packet 0, together with the group before in packet 1.
-uint64_t co_ordinate_system(const etcs::TrainPositionReport& fields) {
-  const uint64_t before = fields.nid_prvlrbg ? *fields.nid_prvlrbg + 1U : 0U;
-  return before << 24U | fields.nid_lrbg;
-}
-
 }  // namespace
 
 bool position_known(const etcs::TrainPositionReport& fields) {
@@ -45,6 +39,11 @@ bool position_known(const etcs::TrainPositionReport& fields) {
 bool interval_known(const etcs::TrainPositionReport& fields) {
   return position_known(fields) && fields.l_doubtover != etcs::kUnknownDistance &&
          fields.l_doubtunder != etcs::kUnknownDistance;
+}
+
+uint64_t co_ordinate_system(const etcs::TrainPositionReport& fields) {
+  const uint64_t before = fields.nid_prvlrbg ? *fields.nid_prvlrbg + 1U : 0U;
+  return before << 24U | fields.nid_lrbg;
 }
 
 bool stands(const etcs::TrainPositionReport& fields) {
@@ -58,6 +57,13 @@ double speed_kmh(const etcs::TrainPositionReport& fields) {
 Axes::Axes(const track::Path& path) : line_(std::in_place) {
   for (const auto& mark : path.balise_groups())
     line_->insert({mark.group->nid_lrbg(), {mark.distance_m, mark.nominal_is_along_path}});
+  for (const auto& group : path.map().balise_groups) {
+    if (!line_->contains(group.nid_lrbg())) other_tracks_.insert(group.nid_lrbg());
+  }
+}
+
+bool Axes::names_other_track(const etcs::TrainPositionReport& fields) const {
+  return other_tracks_.contains(fields.nid_lrbg) || (fields.nid_prvlrbg && other_tracks_.contains(*fields.nid_prvlrbg));
 }
 
 /// The LRBG, and whether "nominal" is along the line.

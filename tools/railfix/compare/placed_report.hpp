@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 
 #include "compare/report_file.hpp"
 #include "track/path.hpp"
@@ -27,6 +28,9 @@ bool position_known(const etcs::TrainPositionReport& fields);
 /// ... and both doubts.
 bool interval_known(const etcs::TrainPositionReport& fields);
 
+/// The LRBG in packet 0, together with the group before in packet 1.
+uint64_t co_ordinate_system(const etcs::TrainPositionReport& fields);
+
 /// V_TRAIN says standstill or 0 km/h.
 bool stands(const etcs::TrainPositionReport& fields);
 /// V_TRAIN.
@@ -42,6 +46,8 @@ class Axes {
 
   /// Nothing when the report says "unknown", or a group that it names is not on the path.
   [[nodiscard]] std::optional<PlacedReport> place(const TimedReport& report) const;
+  /// The map has a group that the report names and that is not on the path.
+  [[nodiscard]] bool names_other_track(const etcs::TrainPositionReport& fields) const;
 
  private:
   struct Group {
@@ -50,6 +56,7 @@ class Axes {
   };
   [[nodiscard]] std::optional<Group> on_line(const etcs::TrainPositionReport& fields) const;
   std::optional<std::map<uint32_t, Group>> line_;
+  std::set<uint32_t> other_tracks_;  // groups of the path's map
 };
 
 }  // namespace railfix::compare

@@ -80,6 +80,26 @@ std::string text_of(const Doubts& doubts) {
         "on %zu legs the intervals have nothing in common, so one side is wrong, and only --truth says which",
         doubts.apart);
   }
+  if (doubts.off_line > 0) {
+    return text_of("on %zu legs ours refers to a group that is not on the line, where the certified system is on it",
+                   doubts.off_line);
+  }
+  if (doubts.other_groups > 0) {
+    return text_of(
+        "on %zu legs ours refers to a group that cannot be compared with that of the certified system; "
+        "say --map, --start and --via with both on the line",
+        doubts.other_groups);
+  }
+  if (doubts.ours_silent()) {
+    return text_of(
+        "at %zu of %zu certified reports ours is silent for longer than --longest-gap-s, and what it would "
+        "have said is not known",
+        doubts.silent, doubts.heard);
+  }
+  if (doubts.other_times()) {
+    return text_of("%zu of %zu certified reports are from before ours begin or after they end; take logs of one time",
+                   doubts.outside, doubts.in_all);
+  }
   if (doubts.ours_seldom()) {
     return text_of("ours reports every %.3g s, the certified system every %.3g s; let both run on the same packet 58",
                    doubts.ours_every_s, doubts.certified_every_s);
@@ -87,12 +107,20 @@ std::string text_of(const Doubts& doubts) {
   return {};
 }
 
+/// Why a length or an error is that of a part only, nullptr where it is not.
+const char* part_only(const Doubts& doubts) {
+  if (doubts.off_line > 0) return "ours refers to groups that are not on the line";
+  if (doubts.other_groups > 0) return "ours refers to groups that cannot be compared";
+  if (doubts.ours_silent()) return "ours is silent where it could be worse";
+  return doubts.ours_seldom() ? "ours reports too seldom" : nullptr;
+}
+
 /// What the verdicts come to.
-Verdict print_sum(const std::vector<Verdict>& verdicts, const Doubts& doubts, bool errors_known) {
+Verdict print_sum(const std::vector<Verdict>& verdicts, const Doubts& doubts, const Columns& columns) {
   const auto any = [&](Verdict one) { return std::ranges::count(verdicts, one) > 0; };
   std::printf("verdict                  ");
   if (any(Verdict::worse)) {
-    std::printf("WORSE\n");
+    std::printf("WORSE%s\n", columns.ours_other_track > 0 ? "; ours refers to groups of another track" : "");
     return Verdict::worse;
   }
   if (const auto doubt = text_of(doubts); !doubt.empty()) {
@@ -103,8 +131,8 @@ Verdict print_sum(const std::vector<Verdict>& verdicts, const Doubts& doubts, bo
     std::printf("not shown\n");
     return Verdict::open;
   }
-  std::printf("%s\n",
-              errors_known ? "at least as good" : "intervals at least as good, and as often known; errors not known");
+  std::printf("%s\n", !columns.errors.empty() ? "at least as good"
+                                              : "intervals at least as good, and as often known; errors not known");
   return Verdict::at_least_as_good;
 }
 
@@ -128,13 +156,12 @@ Verdict print_verdict(const Columns& columns, const Doubts& doubts, const Demand
   std::printf("\nGAMAB, %.0f %% confidence, margin %.0f %%, over legs (ours / certified)\n", 100 * demand.confidence,
               100 * demand.margin);
   std::vector<Verdict> verdicts{print_share(columns.available, demand)};
-  const char* seldom = doubts.ours_seldom() ? "ours reports too seldom" : nullptr;
-  verdicts.push_back(
-      print_ratio("interval length, mean", compare_ratio(columns.lengths, Figure::mean, demand), seldom));
+  const char* part = part_only(doubts);
+  verdicts.push_back(print_ratio("interval length, mean", compare_ratio(columns.lengths, Figure::mean, demand), part));
   if (columns.errors.empty()) {
     std::printf("error                    not known without --truth\n");
   } else {
-    const char* doubt = doubts.stamps ? "stamps are off" : seldom;
+    const char* doubt = doubts.stamps ? "stamps are off" : part;
     verdicts.push_back(
         print_ratio("error, RMS", compare_ratio(columns.errors, Figure::root_mean_square, demand), doubt));
     const auto broken = compare_broken(columns.outside, demand);
@@ -143,9 +170,15 @@ Verdict print_verdict(const Columns& columns, const Doubts& doubts, const Demand
         "demanded %.2g: %s\n",
         broken.ours.broken, broken.ours.legs, broken.certified.broken, broken.certified.legs, broken.ours_at_most,
         demand.broken_at_most, text_of(broken.verdict));
+    if (columns.ours_other_track + columns.certified_other_track > 0) {
+      std::printf(
+          "... by a wrong group      ours %zu, certified %zu reports: one of another track, where the other side is "
+          "right\n",
+          columns.ours_other_track, columns.certified_other_track);
+    }
     verdicts.push_back(broken.verdict);
   }
-  return print_sum(verdicts, doubts, !columns.errors.empty());
+  return print_sum(verdicts, doubts, columns);
 }
 
 }  // namespace railfix::compare

@@ -109,7 +109,8 @@ class ErjuReader {
         continue;
       }
       const bool is_forward = std::string(node.attribute("linkOrientationDirection").value()) != "dirReverse";
-      on.groups.push_back({identity->nid_c, identity->nid_bg, balises.front().offset_m, is_forward, 1, balises});
+      on.groups.push_back(
+          {identity->nid_c, identity->nid_bg, balises.front().offset_m, is_forward, kUnsaidLocationM, balises});
     }
   }
 

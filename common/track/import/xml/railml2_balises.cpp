@@ -79,7 +79,7 @@ class Railml2BaliseReader {
   void add_group(const pugi::xml_node& node, const EtcsIdentity& identity,
                  const std::vector<Railml2PlacedBalise>& balises) {
     const double at_m = balises.front().mark.offset_m;
-    TrackGroup group{identity.nid_c, identity.nid_bg, at_m, true, kRailmlSigmaM, {}};
+    TrackGroup group{identity.nid_c, identity.nid_bg, at_m, true, kUnsaidLocationM, {}};
     for (const Railml2PlacedBalise& balise : balises) group.balises.push_back(balise.mark);
     const std::string direction = balises.front().node.attribute("dir").value();
     if (const std::optional<bool> ordered = nominal_by_order(group.balises)) {

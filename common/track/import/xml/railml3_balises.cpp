@@ -120,7 +120,8 @@ class Railml3BaliseReader {
     if (here.size() < balises.size())
       tell(of, "lies on two net elements; only its balises on \"" + track.name +
                    "\" are kept in it, the others as landmarks");
-    track.groups.push_back({identity.nid_c, identity.nid_bg, first.from_m, *forward, kRailmlSigmaM, std::move(here)});
+    track.groups.push_back(
+        {identity.nid_c, identity.nid_bg, first.from_m, *forward, kUnsaidLocationM, std::move(here)});
   }
 
   /// By the file's word, else by the order of the balises, else by the direction that they apply to.
