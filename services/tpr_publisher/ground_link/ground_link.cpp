@@ -1,7 +1,6 @@
 #include "tpr_publisher/ground_link/ground_link.hpp"
 
 #include <algorithm>
-#include <ranges>
 
 namespace railfix::tpr_publisher {
 
@@ -187,7 +186,8 @@ void GroundLink::notice_silence() {
     if (outbox_.size() + unstored_.size() == 0) silent_since_.reset();
     return;
   }
-  const auto oldest = std::ranges::min(given_ | std::views::values);
+  const auto when = [](const auto& one) { return one.second; };
+  const auto oldest = when(*std::ranges::min_element(given_, {}, when));
   const std::chrono::seconds patience{kSilentKeepAlives * settings_.mqtt.keep_alive_s};
   if (Clock::now() - oldest < patience) return;
   if (!silent_since_) silent_since_ = oldest;
