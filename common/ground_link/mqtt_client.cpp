@@ -10,11 +10,9 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <condition_variable>
 #include <cstring>
-#include <fstream>
 #include <mutex>
 #include <thread>
 
@@ -33,10 +31,15 @@ constexpr double kFirstRetryS = 0.1;
 constexpr int kIdBits = 16;
 constexpr int kMostConnections = 0x7FFF;  // that ids can tell apart
 constexpr int kFirstFailure = 0x80;       // of MQTT 5's reason codes
+constexpr int kSuspicious = 3;            // connections in a row that ended soon
+using Clock = std::chrono::steady_clock;
 
 std::string text_of(int code) {
   if (code == MOSQ_ERR_ERRNO) return std::strerror(errno);
-  return code == MOSQ_ERR_UNKNOWN ? "the connection broke" : mosquitto_strerror(code);
+  if (code == MOSQ_ERR_UNKNOWN) return "the connection broke";
+  std::string text = mosquitto_strerror(code);  // some are sentences
+  if (text.ends_with('.')) text.pop_back();
+  return text;
 }
 
 std::string refusal_text(int code) {
@@ -70,14 +73,20 @@ class MqttClient::Connection {
     }
     thread_.join();
   }
-  core::Result<int> publish(const std::string& topic, std::span<const uint8_t> payload) {
+  core::Result<int> publish(const std::string& topic, std::span<const uint8_t> payload, std::optional<int> over) {
     const std::lock_guard lock(client_mutex_);
-    if (!connected_) return core::Error{"not connected"};
+    if (!connected_ || (over && *over != connections_)) return core::Error{"not connected"};
     int id = 0;
     const int code = mosquitto_publish(client_.get(), &id, topic.c_str(), static_cast<int>(payload.size()),
                                        payload.data(), kQos1, false);
     if (code != MOSQ_ERR_SUCCESS) return core::Error{text_of(code)};
     return own_id(id);
+  }
+  void give_up(int connection, const std::string& why) {
+    const std::lock_guard lock(client_mutex_);
+    if (!connected_ || connection != connections_) return;
+    given_up_ = why;
+    mosquitto_disconnect(client_.get());
   }
 
  private:
@@ -129,9 +138,26 @@ class MqttClient::Connection {
   }
 
   void established() {
-    retry_s_ = kFirstRetryS;
+    established_at_ = Clock::now();
     connected_ = true;
-    if (events_.connected) events_.connected(version_);
+    if (events_.connected) events_.connected({version_, connections_, doubt()});
+  }
+
+  // Whoever is thrown out as soon as it was let in has not reached more than one that was not let in.
+  void notice_whether_it_lasts() {
+    if (lasts_ || !established_at_ || Clock::now() - *established_at_ < kLasting) return;
+    const bool doubted = !doubt().empty();
+    lasts_ = true;
+    retry_s_ = kFirstRetryS;
+    ended_soon_ = 0;
+    if (doubted && events_.lasts) events_.lasts();
+  }
+
+  [[nodiscard]] std::string doubt() const {
+    if (ended_soon_ < kSuspicious) return "";
+    const std::string text =
+        "the connection has ended " + std::to_string(ended_soon_) + " times in a row soon after it began";
+    return options_.client_id.empty() ? text : text + ": is another client called " + options_.client_id + "?";
   }
 
   void set_callbacks() {
@@ -196,7 +222,7 @@ class MqttClient::Connection {
     } else if (code < kFirstFailure) {
       if (events_.delivered) events_.delivered(own_id(id));
     } else if (events_.refused) {
-      events_.refused(own_id(id), refusal_text(code));
+      events_.refused(own_id(id), {refusal_text(code), code == MQTT_RC_NOT_AUTHORIZED});
     }
   }
 
@@ -222,7 +248,8 @@ class MqttClient::Connection {
       const bool older = version_is_unknown_ && version_ == MqttVersion::v5;
       version_ = older ? MqttVersion::v3_1_1 : best_version();
       if (older) continue;
-      if (events_.disconnected) events_.disconnected(why);
+      const auto doubted = doubt();
+      if (events_.disconnected) events_.disconnected(doubted.empty() ? why : why + "; " + doubted);
       pause();
     }
   }
@@ -231,6 +258,8 @@ class MqttClient::Connection {
   std::string connect_once() {
     refusal_.clear();
     version_is_unknown_ = false;
+    established_at_.reset();
+    lasts_ = false;
     try {
       make_client();
     } catch (const core::BadInput& error) {  // the certificates were there when this began
@@ -242,11 +271,27 @@ class MqttClient::Connection {
       return options_.host + ": " + known.error().message;
     mosquitto_int_option(client_.get(), MOSQ_OPT_PROTOCOL_VERSION, static_cast<int>(version_));
     int code = mosquitto_connect_async(client_.get(), options_.host.c_str(), options_.port, options_.keep_alive_s);
-    while (code == MOSQ_ERR_SUCCESS && !stopped()) code = mosquitto_loop(client_.get(), kLoopMs, 1);
-    const std::string why = refusal_.empty() ? text_of(code) : refusal_;
+    for (bool over = false; code == MOSQ_ERR_SUCCESS && !over && !stopped();) {
+      over = is_given_up();  // and once more through the loop, which says good-bye
+      code = mosquitto_loop(client_.get(), kLoopMs, 1);
+      notice_whether_it_lasts();
+    }
     const std::lock_guard lock(client_mutex_);
     connected_ = false;
-    return why;
+    if (!given_up_.empty()) return std::exchange(given_up_, {});
+    if (established_at_ && !lasts_) ++ended_soon_;
+    if (!refusal_.empty()) return refusal_;
+    return code == MOSQ_ERR_KEEPALIVE ? silent() : text_of(code);
+  }
+
+  [[nodiscard]] bool is_given_up() {
+    const std::lock_guard lock(client_mutex_);
+    return !given_up_.empty();
+  }
+
+  // Mosquitto's library has no words for it.
+  [[nodiscard]] std::string silent() const {
+    return "it has not answered for " + std::to_string(options_.keep_alive_s) + " s";
   }
 
   void pause() {
@@ -261,8 +306,12 @@ class MqttClient::Connection {
   std::unique_ptr<mosquitto, Free> client_;
   std::atomic<bool> connected_ = false;
   std::atomic<int> connections_ = 0;
+  std::string given_up_;           // why this connection is
   double retry_s_ = kFirstRetryS;  // from here on the thread's own, until mutex_
   std::string refusal_;
+  std::optional<Clock::time_point> established_at_;  // this connection
+  bool lasts_ = false;
+  int ended_soon_ = 0;  // connections in a row
   MqttVersion version_ = MqttVersion::v5;
   bool version_is_unknown_ = false;  // to the broker
   bool ended_ = false;               // by MqttNext
@@ -276,19 +325,13 @@ MqttClient::MqttClient(const MqttOptions& options, MqttEvents events)
     : connection_(std::make_unique<Connection>(options, std::move(events))) {}
 MqttClient::~MqttClient() = default;
 
-core::Result<int> MqttClient::publish(const std::string& topic, std::span<const uint8_t> payload) {
-  return connection_->publish(topic, payload);
+core::Result<int> MqttClient::publish(const std::string& topic, std::span<const uint8_t> payload,
+                                      std::optional<int> connection) {
+  return connection_->publish(topic, payload, connection);
 }
 
-core::Status check_tls(const MqttOptions& options) {
-  const bool certificate = !options.certificate_file.empty();
-  const bool key = !options.key_file.empty();
-  if (options.ca_file.empty() && (certificate || key))
-    return core::Error{
-        "certificate and key without the broker's authority would go unused, over a link in plain text: "
-        "name the authority, too (ca_file, --ca)."};
-  if (certificate != key) return core::Error{"certificate and key go together: name both, or none."};
-  return {};
+void MqttClient::give_up(int connection, const std::string& why) {
+  connection_->give_up(connection, why);
 }
 
 core::Status check_topic(const std::string& topic) {
@@ -297,33 +340,6 @@ core::Status check_topic(const std::string& topic) {
       mosquitto_validate_utf8(topic.data(), bytes) == MOSQ_ERR_SUCCESS)
     return {};
   return core::Error{"\"" + topic + "\" is no topic to write to: give 1 to 65535 bytes of UTF-8 without + and #."};
-}
-
-std::string plain_password(const MqttOptions& options) {
-  if (options.password.empty() || !options.ca_file.empty()) return "";
-  return "the password goes in plain text to " + options.host + ":" + std::to_string(options.port) +
-         "; name the broker's authority (ca_file, --ca), and its port for TLS (8883)";
-}
-
-core::Status parse_broker(const std::string& text, MqttOptions& options) {
-  const auto colon = text.rfind(':');
-  options.host = text.substr(0, colon);
-  if (colon != std::string::npos) {
-    const char* end = text.data() + text.size();
-    const auto parsed = std::from_chars(text.data() + colon + 1, end, options.port);
-    if (parsed.ec != std::errc() || parsed.ptr != end || options.port < 1 || options.port > 65535)
-      return core::Error{"Broker \"" + text + "\": give HOST or HOST:PORT, e.g. localhost:1883."};
-  }
-  if (options.host.empty()) return core::Error{"Broker \"" + text + "\": the host is missing, e.g. localhost:1883."};
-  return {};
-}
-
-core::Result<std::string> read_password(const std::string& file) {
-  std::ifstream stream(file);
-  std::string password;
-  if (!stream || !std::getline(stream, password) || password.empty())
-    return core::Error{file + ": no password can be read; put it into the first line."};
-  return password;
 }
 
 }  // namespace railfix::ground_link

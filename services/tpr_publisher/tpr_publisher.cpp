@@ -23,22 +23,27 @@ constexpr double kMovesM = 0.04;     // by 5 cm fusion ends a rest: it is known 
 constexpr double kForgetsS = 5;      // at rest: an error of the speed adds up to no way
 constexpr double kCorrectionM = 20;  // a distance may be corrected by so much, and by what it was not sure of
 
-/// Empty when the position is young enough.
-std::string age_refusal(int64_t stamp_ns, int64_t now_ns) {
+std::string not_sent(const std::string& why) {
+  return "Position report not sent: " + why;
+}
+
+Outcome no_report(bool due, const std::string& why) {
+  return {std::nullopt, due ? not_sent(why) : "No position report can be sent: " + why};
+}
+
+/// Why no report can be made of it; empty when the position is young enough.
+std::string too_old(int64_t stamp_ns, int64_t now_ns) {
   const int64_t age_ns = now_ns - stamp_ns;
   if (age_ns < kOldestNs && age_ns > -kOldestNs) return "";
   if (std::abs(age_ns) > kOtherTimeNs)
-    return "Position report not sent: the last train_state is of another time; played data has not said yet which time "
-           "it is there, or a host's clock is wrong.";
+    return "the last train_state is of another time; played data has not said yet which time it is there, or a host's "
+           "clock is wrong.";
   char text[160];
   if (age_ns > 0) {
-    std::snprintf(text, sizeof text, "Position report not sent: the last train_state is %.1f s old, the limit is 1 s.",
-                  core::seconds(age_ns));
+    std::snprintf(text, sizeof text, "the last train_state is %.1f s old, the limit is 1 s.", core::seconds(age_ns));
   } else {
-    std::snprintf(
-        text, sizeof text,
-        "Position report not sent: the last train_state lies %.1f s in the future; synchronise the hosts' clocks.",
-        -core::seconds(age_ns));
+    std::snprintf(text, sizeof text, "the last train_state lies %.1f s in the future; synchronise the hosts' clocks.",
+                  -core::seconds(age_ns));
   }
   return text;
 }
@@ -266,19 +271,18 @@ void TprPublisher::watch(const TrainPosition& position, int64_t now_ns) {
 
 Outcome TprPublisher::update(const TrainPosition& position, int64_t now_ns) {
   if (!is_number(position)) {
-    return {std::nullopt, "Position report not sent: speed or distance of the train_state is not a number."};
+    return {std::nullopt, not_sent("speed or distance of the train_state is not a number.")};
   }
   follow(position);
   const auto now = moment(now_ns);
   const auto reason = trigger_.due(now);
+  if (const auto why = too_old(position.stamp_ns, now_ns); !why.empty()) return no_report(reason.has_value(), why);
   if (!reason) return {};
-  if (auto refusal = age_refusal(position.stamp_ns, now_ns); !refusal.empty())
-    return {std::nullopt, std::move(refusal)};
   if (std::isnan(position.speed_mps) && !position.standstill)
-    return {std::nullopt, "Position report not sent: the speed is not known, and V_TRAIN has no value that says so."};
+    return {std::nullopt, not_sent("the speed is not known, and V_TRAIN has no value that says so.")};
   Report report{position.stamp_ns, now_ns, *reason, fields(now_ns), {}};
   auto message = etcs::encode(report.fields, settings_.report.baseline);
-  if (!message.ok()) return {std::nullopt, "Position report not sent: " + message.error().message};
+  if (!message.ok()) return {std::nullopt, not_sent(message.error().message)};
   report.message = std::move(message).value();
   sent(report, now);
   return {std::move(report), ""};
@@ -300,6 +304,10 @@ void TprPublisher::hear_trainborne(uint32_t t_train_heard, int64_t now_ns) {
   sent_trainborne_ns_ = std::max(sent_trainborne_ns_, now_ns + ahead * kTrainborneStepNs);
 }
 
+void TprPublisher::hear_confirmed(int64_t stamp_ns) {
+  if (settings_.report.baseline == etcs::Baseline::b4) integrity_.use_up_until(stamp_ns);
+}
+
 void TprPublisher::sent(const Report& report, const Moment& moment) {
   trigger_.sent(moment);
   sent_trainborne_ns_ = trainborne_ns(report.sent_ns);
@@ -308,10 +316,9 @@ void TprPublisher::sent(const Report& report, const Moment& moment) {
 }
 
 Outcome TprPublisher::tick(int64_t now_ns) {
-  if (!position_) return {std::nullopt, "Position report not sent: no train_state yet."};
-  auto refusal = age_refusal(position_->stamp_ns, now_ns);
-  if (refusal.empty() || !trigger_.due(moment(now_ns))) return {};
-  return {std::nullopt, std::move(refusal)};
+  if (!position_) return {std::nullopt, not_sent("no train_state yet.")};
+  const auto why = too_old(position_->stamp_ns, now_ns);
+  return why.empty() ? Outcome{} : no_report(trigger_.due(moment(now_ns)).has_value(), why);
 }
 
 }  // namespace railfix::tpr_publisher

@@ -2,6 +2,7 @@
 // what time it is.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -48,10 +49,15 @@ class TprPublisher {
   Outcome update(const TrainPosition& position, int64_t now_ns);
   /// T_TRAIN of a report of another tpr_publisher: reports of this one are later.
   void hear_trainborne(uint32_t t_train, int64_t now_ns);
+  /// That one has reported a confirmation of integrity with a position of that time: in 4.0.0 it is not said again.
+  void hear_confirmed(int64_t stamp_ns);
+  /// T_TRAIN's time of the last report, 0 = none; and that of a process before, after which reports of this one are.
+  [[nodiscard]] int64_t trainborne_ns() const { return sent_trainborne_ns_; }
+  void go_on_after(int64_t trainborne_ns) { sent_trainborne_ns_ = std::max(sent_trainborne_ns_, trainborne_ns); }
   /// Another tpr_publisher reports: follows the train, and begins with a report of its own when update() is called
   /// next.
   void watch(const TrainPosition& position, int64_t now_ns);
-  /// Time goes on without a position: says when a report is due that cannot be sent.
+  /// Time goes on without a position: says that no report can be sent, whether one is due or not.
   Outcome tick(int64_t now_ns);
   /// A packet 58 from trackside. One for the other orientation than the train's (Q_DIR) is refused, as 3.6.3.1.3 asks.
   /// `origin`, `waited`: the group that Q_DIR and locations refer to, as for the trigger.

@@ -3,7 +3,9 @@
 namespace railfix::tpr_publisher {
 
 void GroundLinkConfig::describe(service::Fields& fields) {
-  fields.text("broker", broker, "MQTT broker, HOST or HOST:PORT; empty = reports are not sent to the ground.");
+  fields.text(
+      "broker", broker,
+      "MQTT broker, HOST or HOST:PORT, an IPv6 address as [ADDRESS]:PORT; empty = reports are not sent to the ground.");
   fields.text("topic", topic, "MQTT topic; {train} becomes common.train_id, {host} common.host.");
   fields.text("client_id", client_id,
               "MQTT client id, another one for every client of the broker; empty = railfix-{train}-{host}.");
@@ -11,9 +13,11 @@ void GroundLinkConfig::describe(service::Fields& fields) {
   fields.integer("store_limit", store_limit, {1, 10000000}, "reports",
                  "Most that wait in the store; beyond it the oldest are lost.");
   fields.number("longest_retry_s", longest_retry_s, {0.1, 600}, "s",
-                "Longest pause between two attempts to connect; the first is 0.1 s, each next one twice as long.");
+                "Longest pause between two attempts to connect; the first is 0.1 s, each next one twice as long, until "
+                "one lasts 15 s.");
   fields.integer("keep_alive_s", keep_alive_s, {5, 3600}, "s",
-                 "A broker that is silent for one and a half of it is taken for gone.");
+                 "A broker that is silent for twice as long is taken for gone, and one that confirms nothing for so "
+                 "long is left.");
   fields.text("ca_file", ca_file, "Certificate authority of the broker, PEM; empty = no TLS.");
   fields.text("certificate_file", certificate_file, "This train's certificate, PEM; empty = none.");
   fields.text("key_file", key_file, "Key of this train's certificate, PEM.");

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <utility>
 
 #include "core/time.hpp"
 #include "tpr_publisher/tpr_messages.hpp"
@@ -46,14 +48,22 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
   context.every(kTickPeriod, [this] { on_tick(); });
   share_charge();
   context.at_restart([this](int64_t) { restart(); });
-  remember_packet_58();
+  remember();
 }
 
-// It outlives a restart, also while the on-board unit is silent.
-void TprPublisherService::remember_packet_58() {
+// Packet 58 outlives a restart, also while the on-board unit is silent; T_TRAIN a clock that was set back meanwhile.
+void TprPublisherService::remember() {
   if (context_.common().lock_step) return;
   kept_ = context_.kept();
-  note_packet_58(told_.remember(kept_));
+  const auto end = kept_.find('\n');
+  if (end != std::string::npos) kept_trainborne_ns_ = std::strtoll(kept_.c_str() + end, nullptr, 10);
+  note_packet_58(told_.remember(kept_.substr(0, end)));
+}
+
+// Of the host's time only: data is played more than once.
+void TprPublisherService::go_on_with_trainborne(int64_t stamp_ns) {
+  if (data_time_ || std::abs(core::wall_ns() - stamp_ns) > core::kNsPerSecond) return;
+  publisher_.go_on_after(std::exchange(kept_trainborne_ns_, 0));
 }
 
 // It stands in every onboard_status: who was away, or is the second one of two, hears it all the same.
@@ -70,7 +80,14 @@ void TprPublisherService::hear_packet_58(const msg::OnboardStatus& status, bool 
 
 void TprPublisherService::note_packet_58(bool taken) {
   if (taken) context_.log().info("position report parameters of packet 58 taken over");
-  const auto notes = told_.notes();
+  keep_notes();
+}
+
+void TprPublisherService::keep_notes() {
+  if (context_.common().lock_step) return;
+  auto notes = told_.notes();
+  const int64_t trainborne_ns = std::max(publisher_.trainborne_ns(), kept_trainborne_ns_);
+  if (!data_time_ && trainborne_ns > 0) notes += '\n' + std::to_string(trainborne_ns);
   if (notes == kept_) return;
   kept_ = notes;
   context_.keep(notes);
@@ -88,7 +105,9 @@ void TprPublisherService::hear_other(const msg::TrainPositionReport& report) {
   seq_ = std::max(seq_, report.seq() + 1);
   const size_t bytes = std::min<size_t>(report.message_bytes(), report.message().size());
   const auto fields = etcs::decode({report.message().data(), bytes}, static_cast<etcs::Baseline>(report.baseline()));
-  if (fields.ok()) publisher_.hear_trainborne(fields.value().t_train, now_ns(report.sent_ns()));
+  if (!fields.ok()) return;
+  publisher_.hear_trainborne(fields.value().t_train, now_ns(report.sent_ns()));
+  if (is_confirmed(fields.value().q_length)) publisher_.hear_confirmed(report.stamp_ns());
 }
 
 // Without a way to the ground reports only wait; without a store a power cut loses some; with a wrong clock they would
@@ -128,6 +147,7 @@ void TprPublisherService::on_state(const msg::TrainState& state) {
     stand_by(state, now);
     return;
   }
+  go_on_with_trainborne(state.stamp_ns());
   const auto position = position_of(map_.get(), state);
   const auto outcome = publisher_.update(position, now);
   note_packet_58(told_.follow());

@@ -25,9 +25,12 @@ class TprPublisherService {
   void notice_gap();
   /// `just_come`: it did not stand in an onboard_status of some seconds ago.
   void hear_packet_58(const msg::OnboardStatus& status, bool just_come);
-  void remember_packet_58();
-  /// For a later process. `taken`: one is used from now on.
+  void remember();
+  /// `taken`: one is used from now on.
   void note_packet_58(bool taken);
+  /// For a later process.
+  void keep_notes();
+  void go_on_with_trainborne(int64_t stamp_ns);
   void share_charge();
   void hear_other(const msg::TrainPositionReport& report);
   void say_what_is_assumed();
@@ -47,7 +50,8 @@ class TprPublisherService {
   std::shared_ptr<const track::Map> map_;  // nullptr = none is set
   TprPublisher publisher_;
   ToldParameters told_;
-  std::string kept_;  // of told_, as a later process finds it
+  std::string kept_;                // of told_ and T_TRAIN, as a later process finds it
+  int64_t kept_trainborne_ns_ = 0;  // of the process before, until it is used
   messaging::Writer<msg::TrainPositionReport> writer_;
   std::optional<service::DataTime> data_time_;  // of played data
   bool state_seen_ = false;

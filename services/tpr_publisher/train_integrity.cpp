@@ -63,6 +63,19 @@ void TrainIntegrity::hear(uint32_t q_integrity, int64_t integrity_ns, double tra
   settle();
 }
 
+void TrainIntegrity::use_up_until(int64_t stamp_ns) {
+  if (next_ && next_->integrity_ns <= stamp_ns) {
+    heard_ = *next_;
+    next_.reset();
+  }
+  if (is_confirmed(heard_.q_integrity) && heard_.integrity_ns <= stamp_ns) {
+    before_ = {};
+    used_up_ns_ = heard_.integrity_ns;
+  } else if (!settled_ && before_.integrity_ns <= stamp_ns) {
+    use_up();
+  }
+}
+
 void TrainIntegrity::settle() {
   while (!settled_ && !places_.empty() && places_.back().stamp_ns >= heard_.integrity_ns) {
     place_rear();

@@ -42,6 +42,8 @@ class TrainIntegrity {
   /// The confirmation that stands says nothing any more. In 4.0.0 it is reported once, and ends when the train backs
   /// (3.6.5.2.5, table 2c [5] and [8]).
   void use_up() { used_up_ns_ = integrity_ns(); }
+  /// As use_up(): somebody else has reported it, with a place of that time. It may not have been settled here yet.
+  void use_up_until(int64_t stamp_ns);
   /// A train that has backed since then is not taken for shorter. reported_ahead_m: how far in front of distance_m the
   /// report says the front end to be, from which trackside counts the length. A front end that was moved forward since
   /// then leaves the rear end where it was.

@@ -9,32 +9,39 @@ namespace {
 constexpr size_t kMostUnderWay = 20;
 constexpr size_t kMostUnstored = 1000;
 constexpr std::chrono::seconds kRetrySoon{1};  // of the store, and of what the client did not take
-using Clock = std::chrono::steady_clock;
+constexpr int kSilentKeepAlives = 2;           // as long as it takes at most to find a broker gone
+
+/// There may be reports of before in it.
+bool may_hold_reports(const std::filesystem::path& file) {
+  std::error_code failed;
+  const auto bytes = std::filesystem::file_size(file, failed);
+  return failed ? failed != std::errc::no_such_file_or_directory : bytes > 0;
+}
 
 }  // namespace
 
 GroundLink::GroundLink(const GroundLinkSettings& settings)
     : settings_(settings),
-      store_(core::value_or_throw(ReportStore::open(settings.store))),
+      open_again_at_(Clock::now()),
+      memory_goes_at_(open_again_at_),
       outbox_(kMostUnderWay),
-      memory_stream_(ReportStore::new_stream()),
+      stream_(ReportStore::new_stream()),
       link_trouble_("not yet connected") {
-  for (const uint64_t sequence : core::value_or_throw(store_.sequences())) outbox_.stored(sequence);
+  if (may_hold_reports(settings.store)) memory_goes_at_ += settings.read_patience;
+  open_store();
   say();
   client_ = std::make_unique<ground_link::MqttClient>(
       settings.mqtt, ground_link::MqttEvents{
-                         .connected = [this](auto version) { push(Connected{version}); },
+                         .connected = [this](const Connected& now) { push(now); },
                          .disconnected = [this](const std::string& why) { push(Disconnected{why}); },
                          .delivered = [this](int id) { push(Delivered{id}); },
                          .refused =
-                             [this](int id, const std::string& why) {
-                               push(Refused{id, why});
+                             [this](int id, const auto& refusal) {
+                               push(Refused{id, refusal});
                              },
                          .received = {},
-                         .unheard =
-                             [this](int id) {
-                               push(Refused{id, ""});
-                             },
+                         .unheard = [this](int id) { push(Unheard{id}); },
+                         .lasts = [this] { push(Lasts{}); },
                      });
   thread_ = std::thread([this] { run(); });
 }
@@ -84,8 +91,8 @@ void GroundLink::push(Event event) {
 std::deque<GroundLink::Event> GroundLink::wait() {
   std::unique_lock lock(mutex_);
   const auto ready = [this] { return stop_ || !events_.empty(); };
-  const bool soon_again =
-      !unstored_.empty() || !delivered_.empty() || !read_trouble_.empty() || !publish_trouble_.empty();
+  const bool soon_again = !store_ || !unstored_.empty() || !delivered_.empty() || !read_trouble_.empty() ||
+                          !publish_trouble_.empty() || !given_.empty() || silent_since_;
   auto until = Clock::now() + kRetrySoon;
   if (outbox_.held()) until = soon_again ? std::min(until, try_again_at_) : try_again_at_;
   if (soon_again || outbox_.held()) {
@@ -104,7 +111,10 @@ void GroundLink::run() {
       last = stop_ && events.empty() && events_.empty();
     }
     for (auto& event : events) take(event);
-    if (!unstored_.empty() || !delivered_.empty()) store_trouble_.clear();  // unless it is met again
+    notice_silence();
+    if (last) open_again_at_ = {};
+    open_store();
+    if (store_ && (!unstored_.empty() || !delivered_.empty())) store_trouble_.clear();  // unless it is met again
     remove_delivered();
     store_new(last);
     try_again();
@@ -117,55 +127,92 @@ void GroundLink::take(Event& event) {
   std::visit([this](auto& one) { take(one); }, event);
 }
 
+// Numbered by each start anew: a store from which a lying disk or a copy has lost the newest would give their numbers
+// to other reports, which the ground took for those that it has.
+void GroundLink::take(ground_link::GroundReport& report) {
+  report.stream = stream_;
+  report.sequence = ++sequence_;
+  unstored_.push_back({std::move(report)});
+}
+
 void GroundLink::take(const Connected& now) {
+  connection_ = now.number;
   link_trouble_.clear();
+  doubt_ = now.doubt;
+  version_remark_ = now.version == ground_link::MqttVersion::v5 ? "" : only_311();
   outbox_.connected();
-  const std::lock_guard lock(mutex_);
-  remark_ = now.version == ground_link::MqttVersion::v5
-                ? ""
-                : "Ground link: the broker " + broker() +
-                      " knows only MQTT 3.1.1, which confirms what its list of rights refuses and what nobody there "
-                      "waits for: "
-                      "such reports are lost unseen. Look on the ground with railfix tpr listen whether they come.";
+}
+
+void GroundLink::take(const Lasts& /*lasts*/) {
+  doubt_.clear();
 }
 
 void GroundLink::take(const Disconnected& lost) {
   link_trouble_ = "not connected to " + broker() + " (" + lost.why + ")";
+  given_.clear();
   outbox_.disconnected();
   while (!unstored_under_way_.empty()) wait_again(unstored_under_way_.begin()->first);
 }
 
 void GroundLink::take(const Delivered& report) {
+  given_.erase(report.id);
+  silent_since_.reset();
   unstored_under_way_.erase(report.id);
   if (const auto sequence = outbox_.delivered(report.id)) delivered_.push_back(*sequence);
   if (!outbox_.held()) refusal_.clear();
 }
 
 void GroundLink::take(const Refused& report) {
+  not_taken(report.id, refused_because(report.refusal));
+}
+
+void GroundLink::take(const Unheard& report) {
+  not_taken(report.id, nobody_listens());
+}
+
+void GroundLink::not_taken(int id, std::string why) {
+  given_.erase(id);
+  silent_since_.reset();
   if (!outbox_.held()) try_again_at_ = Clock::now() + pause();
-  outbox_.refused(report.id);
-  refusal_ = report.why.empty() ? nobody_listens() : refused_because(report.why);
-  wait_again(report.id);
+  outbox_.refused(id);
+  refusal_ = std::move(why);
+  wait_again(id);
 }
 
-std::string GroundLink::nobody_listens() const {
-  return "nobody on the ground has subscribed to " + settings_.topic + " at " + broker() +
-         "; start who listens there (as railfix tpr listen)";
+// Over a connection that stands nothing is repeated: a confirmation that got lost, or a broker that hangs and keeps the
+// connection, would hold the reports up for ever.
+void GroundLink::notice_silence() {
+  if (given_.empty()) {
+    if (outbox_.size() + unstored_.size() == 0) silent_since_.reset();
+    return;
+  }
+  const auto when = [](const auto& one) { return one.second; };
+  const auto oldest = when(*std::ranges::min_element(given_, {}, when));
+  const std::chrono::seconds patience{kSilentKeepAlives * settings_.mqtt.keep_alive_s};
+  if (Clock::now() - oldest < patience) return;
+  if (!silent_since_) silent_since_ = oldest;
+  client_->give_up(connection_, "it has confirmed nothing for " + std::to_string(patience.count()) + " s");
 }
 
-std::string GroundLink::refused_because(const std::string& why) const {
-  const std::string user = settings_.mqtt.user.empty() ? "a client without a user name" : "user " + settings_.mqtt.user;
-  return "the broker " + broker() + " refuses what " + user + " writes to " + settings_.topic + " (" + why +
-         "); let it write there in the broker's list of rights (acl_file)";
+// Its disk may be full, read-only or not there yet: reports go from memory until then.
+void GroundLink::open_store() {
+  if (store_ || Clock::now() < open_again_at_) return;
+  open_again_at_ = Clock::now() + kRetrySoon;
+  auto opened = ReportStore::open(settings_.store);
+  const auto stored = opened.ok() ? opened.value().sequences() : core::Result<std::vector<uint64_t>>(opened.error());
+  if (!stored.ok()) {
+    store_trouble_ = stored.error().message;
+    return;
+  }
+  store_trouble_.clear();
+  store_ = std::move(opened).value();
+  for (const uint64_t sequence : stored.value()) outbox_.stored(sequence);
 }
 
-// With its number: under another one the ground would miss this one.
 void GroundLink::wait_again(int id) {
   auto unstored = unstored_under_way_.extract(id);
   if (!unstored) return;
-  const auto later = [&](const auto& one) {
-    return !one.has_number() || one.report.sequence > unstored.mapped().report.sequence;
-  };
+  const auto later = [&](const auto& one) { return one.report.sequence > unstored.mapped().report.sequence; };
   unstored_.insert(std::ranges::find_if(unstored_, later), std::move(unstored.mapped()));
 }
 
@@ -175,7 +222,8 @@ void GroundLink::try_again() {
 
 // In one go: when that is lost in a power cut they are only sent again.
 void GroundLink::remove_delivered() {
-  const auto removed = store_.remove(delivered_);
+  if (!store_) return;
+  const auto removed = store_->remove(delivered_);
   if (removed.ok()) {
     delivered_.clear();
   } else {
@@ -183,13 +231,14 @@ void GroundLink::remove_delivered() {
   }
 }
 
-// One that has a number of the memory's stream keeps it, stored at the end at most: the broker may have it already, and
-// the ground would miss that number.
+// One that was given to the client goes before what is stored since, and is stored at the end at most: it would come
+// behind that there.
 void GroundLink::store_new(bool all) {
-  const auto has_none = [](const Unstored& one) { return !one.has_number(); };
-  auto next = all ? unstored_.begin() : std::ranges::find_if(unstored_, has_none);
+  const auto is_new = [](const Unstored& one) { return !one.given; };
+  auto next = all ? unstored_.begin() : std::ranges::find_if(unstored_, is_new);
   while (next != unstored_.end()) {
-    const auto sequence = store_.append(ground_link::to_bytes(next->report));
+    const auto sequence = store_ ? store_->append(ground_link::to_bytes(next->report))
+                                 : core::Result<uint64_t>(core::Error{store_trouble_});
     if (!sequence.ok()) {
       store_trouble_ = sequence.error().message;
       while (unstored_.size() > kMostUnstored) {
@@ -216,35 +265,31 @@ void GroundLink::publish() {
   }
 }
 
-std::string GroundLink::broker() const {
-  return settings_.mqtt.host + ":" + std::to_string(settings_.mqtt.port);
-}
-
 std::chrono::nanoseconds GroundLink::pause() const {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
       std::chrono::duration<double>(settings_.mqtt.longest_retry_s));
 }
 
-std::optional<int> GroundLink::give(ground_link::GroundReport report, uint64_t stream, uint64_t sequence) {
-  report.stream = stream;
-  report.sequence = sequence;
-  const auto id = client_->publish(settings_.topic, ground_link::to_bytes(report));
-  if (id.ok()) return id.value();
-  publish_trouble_ = "a report cannot be given to " + broker() + " (" + id.error().message + ")";
-  return std::nullopt;
+std::optional<int> GroundLink::give(const ground_link::GroundReport& report) {
+  const auto id = client_->publish(settings_.topic, ground_link::to_bytes(report), connection_);
+  if (!id.ok()) {
+    publish_trouble_ = "a report cannot be given to " + broker() + " (" + id.error().message + ")";
+    return std::nullopt;
+  }
+  given_[id.value()] = Clock::now();
+  return id.value();
 }
 
 void GroundLink::publish_unstored() {
+  if (!store_ && Clock::now() < memory_goes_at_) return;
   while (!unstored_.empty() && outbox_.takes_unstored(unstored_.front().behind)) {
-    auto& [report, behind] = unstored_.front();
-    const uint64_t sequence = report.sequence != 0 ? report.sequence : memory_sequence_ + 1;
-    const auto id = give(report, memory_stream_, sequence);
+    auto& next = unstored_.front();
+    const auto id = give(next.report);
     if (!id) return;
-    memory_sequence_ = std::max(memory_sequence_, sequence);
-    report.sequence = sequence;
-    behind = std::min(behind, outbox_.newest());
+    next.given = true;
+    next.behind = std::min(next.behind, outbox_.newest());
     outbox_.published_unstored(*id);
-    unstored_under_way_.insert_or_assign(*id, std::move(unstored_.front()));
+    unstored_under_way_.insert_or_assign(*id, std::move(next));
     unstored_.pop_front();
   }
 }
@@ -262,48 +307,24 @@ void GroundLink::publish_stored() {
   read_trouble_.clear();
   const uint64_t last = unstored_.empty() ? UINT64_MAX : unstored_.front().behind;
   for (auto sequence = outbox_.next(); sequence && *sequence <= last; sequence = outbox_.next()) {
-    const auto bytes = store_.read(*sequence);
+    const auto bytes = store_->read(*sequence);
     if (!bytes.ok() && waits_to_read(bytes.error())) return;
     if (bytes.ok()) unreadable_since_.reset();
-    const auto report = bytes.ok() && bytes.value() ? ground_link::ground_report_from(*bytes.value())
-                                                    : core::Result<ground_link::GroundReport>(core::Error{"damaged"});
+    auto report = bytes.ok() && bytes.value() ? ground_link::ground_report_from(*bytes.value())
+                                              : core::Result<ground_link::GroundReport>(core::Error{"damaged"});
     if (!report.ok()) {  // it stays in the store: a new start tries it again
       ++dropped_;
       outbox_.skip();
       continue;
     }
-    const auto id = give(report.value(), store_.stream(), *sequence);
+    if (report.value().stream == 0) {  // stored by a version that numbered what it sent by the rows of the store
+      report.value().stream = store_->stream();
+      report.value().sequence = *sequence;
+    }
+    const auto id = give(report.value());
     if (!id) return;
     outbox_.published(*id);
   }
-}
-
-void GroundLink::say() {
-  std::string sentence;
-  const auto& own_trouble = link_trouble_.empty() ? publish_trouble_ : link_trouble_;
-  if (const auto& trouble = own_trouble.empty() ? refusal_ : own_trouble; !trouble.empty()) {
-    sentence = "Ground link: " + trouble + "; " + std::to_string(outbox_.size() + unstored_.size()) + " reports wait.";
-  }
-  if (dropped_ > 0)
-    sentence += (sentence.empty() ? "" : " ") + std::to_string(dropped_) + " reports for the ground are lost.";
-  const size_t in_memory = unstored_.size() + unstored_under_way_.size();
-  std::string storing;
-  if (!store_trouble_.empty()) {
-    storing = store_trouble_ + " Reports go from memory: " + std::to_string(in_memory) +
-              " wait there, and a power cut would lose them.";
-  } else if (in_memory > 0) {
-    storing = "The store works again; " + std::to_string(in_memory) +
-              " reports of before wait in memory, and a power cut would lose them.";
-  }
-  const std::string reading =
-      read_trouble_.empty() ? "" : read_trouble_ + " Stored reports wait until they can be read again.";
-  for (const auto& trouble : {storing, reading, store_.problem()}) {
-    if (!trouble.empty()) sentence += (sentence.empty() ? "" : " ") + trouble;
-  }
-  const std::lock_guard lock(mutex_);
-  trouble_ = sentence;
-  connected_ = own_trouble.empty() && refusal_.empty();
-  stores_ = storing.empty();
 }
 
 }  // namespace railfix::tpr_publisher

@@ -1,7 +1,7 @@
 // Position reports to the ground: stored first, then sent over MQTT (QoS 1) in the order in which they were made,
 // removed from the store when the broker has them; what it refuses stays there, and is offered again. What cannot be
-// stored (a full disk) goes from memory, in a stream of its own. Two threads of its own: a slow disk or network never
-// holds the service up.
+// stored (a full disk, a store that cannot be opened) goes from memory. Two threads of its own: a slow disk or network
+// never holds the service up.
 #pragma once
 
 #include <chrono>
@@ -25,12 +25,12 @@ struct GroundLinkSettings {
   std::string topic;
   std::filesystem::path store;
   size_t store_limit = 100'000;
-  std::chrono::seconds read_patience{60};  // those behind a stored report that cannot be read wait so long
+  std::chrono::seconds read_patience{60};  // those behind stored reports that cannot be read wait so long
 };
 
 class GroundLink {
  public:
-  /// Throws BadInput when the store or the certificates cannot be opened.
+  /// Throws BadInput when the certificates cannot be opened. A store that cannot be is tried again.
   explicit GroundLink(const GroundLinkSettings& settings);
   ~GroundLink();
   GroundLink(const GroundLink&) = delete;
@@ -48,9 +48,8 @@ class GroundLink {
   [[nodiscard]] bool stores() const;
 
  private:
-  struct Connected {
-    ground_link::MqttVersion version;
-  };
+  using Clock = std::chrono::steady_clock;
+  using Connected = ground_link::MqttConnection;
   struct Disconnected {
     std::string why;
   };
@@ -59,25 +58,35 @@ class GroundLink {
   };
   struct Refused {
     int id;
-    std::string why;  // empty: nobody there waits for it
+    ground_link::MqttRefusal refusal;
   };
+  struct Unheard {
+    int id;
+  };
+  struct Lasts {};
   struct Unstored {
-    ground_link::GroundReport report;  // has its number from when it was first under way
-    uint64_t behind = UINT64_MAX;      // the newest in the store at that time
-    [[nodiscard]] bool has_number() const { return report.sequence != 0; }
+    ground_link::GroundReport report;
+    bool given = false;            // to the client, some time: the broker may have it
+    uint64_t behind = UINT64_MAX;  // the newest in the store when it was first
   };
-  using Event = std::variant<ground_link::GroundReport, Connected, Disconnected, Delivered, Refused>;
+  using Event = std::variant<ground_link::GroundReport, Connected, Disconnected, Delivered, Refused, Unheard, Lasts>;
   void push(Event event);
   [[nodiscard]] std::deque<Event> wait();
   void run();
   void take(Event& event);
-  void take(ground_link::GroundReport& report) { unstored_.push_back({std::move(report)}); }
+  void take(ground_link::GroundReport& report);
   void take(const Connected& now);
   void take(const Disconnected& lost);
   void take(const Delivered& report);
   void take(const Refused& report);
+  void take(const Unheard& report);
+  void take(const Lasts& lasts);
+  void not_taken(int id, std::string why);
+  [[nodiscard]] std::string only_311() const;
   [[nodiscard]] std::string nobody_listens() const;
-  [[nodiscard]] std::string refused_because(const std::string& why) const;
+  [[nodiscard]] std::string refused_because(const ground_link::MqttRefusal& refusal) const;
+  void notice_silence();
+  void open_store();
   void wait_again(int id);
   void try_again();
   void remove_delivered();
@@ -87,28 +96,38 @@ class GroundLink {
   [[nodiscard]] bool waits_to_read(const core::Error& error);
   void publish_unstored();
   /// The client's id of it; nothing when the client does not take it now.
-  std::optional<int> give(ground_link::GroundReport report, uint64_t stream, uint64_t sequence);
+  std::optional<int> give(const ground_link::GroundReport& report);
   void say();
-  [[nodiscard]] std::string broker() const;
+  [[nodiscard]] std::string own_trouble() const;
+  [[nodiscard]] std::string trouble_with_reports() const;
+  [[nodiscard]] std::string storing_trouble() const;
+  [[nodiscard]] std::string broker() const { return ground_link::broker_of(settings_.mqtt); }
   /// Before what was refused is tried again.
   [[nodiscard]] std::chrono::nanoseconds pause() const;
 
   GroundLinkSettings settings_;
-  ReportStore store_;  // from here on the worker's own, until mutex_
+  std::optional<ReportStore> store_;  // from here on the worker's own, until mutex_; nothing = cannot be opened
+  Clock::time_point open_again_at_;
+  Clock::time_point memory_goes_at_;  // what lies in the store that cannot be opened goes first, until then
   Outbox outbox_;
   std::deque<Unstored> unstored_;
   std::map<int, Unstored> unstored_under_way_;
   std::vector<uint64_t> delivered_;  // or beyond the limit: to be removed from the store
-  uint64_t memory_stream_;           // of what was never stored
-  uint64_t memory_sequence_ = 0;
-  std::string link_trouble_;     // why there is no connection
+  uint64_t stream_;                  // of what is sent from now on, stored or not
+  uint64_t sequence_ = 0;
+  int connection_ = 0;                             // the client's number of it, as far as the outbox knows
+  std::map<int, Clock::time_point> given_;         // when, of what is under way
+  std::optional<Clock::time_point> silent_since_;  // the broker confirms and refuses nothing; nothing = it does
+  std::string link_trouble_;                       // why there is no connection
+  std::string doubt_;                              // why the one that there is may not last
   std::string publish_trouble_;  // why the client did not take a report over one that there is; tried again
   std::string refusal_;          // empty = the broker takes what it gets
-  std::chrono::steady_clock::time_point try_again_at_;
+  Clock::time_point try_again_at_;
   std::string store_trouble_;
   std::string read_trouble_;  // why the next stored report cannot be read now; tried again
-  std::optional<std::chrono::steady_clock::time_point> unreadable_since_;
+  std::optional<Clock::time_point> unreadable_since_;
   size_t dropped_ = 0;
+  std::string version_remark_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<Event> events_;

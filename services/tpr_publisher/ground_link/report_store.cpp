@@ -1,10 +1,13 @@
 #include "tpr_publisher/ground_link/report_store.hpp"
 
 #include <sqlite3.h>
+#include <sys/statvfs.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <random>
 
+#include "core/joined.hpp"
 #include "core/whole_file.hpp"
 
 namespace railfix::tpr_publisher {
@@ -24,14 +27,46 @@ struct Close {
   void operator()(sqlite3* handle) const { sqlite3_close(handle); }
 };
 
-bool move_aside(const fs::path& file) {
+fs::path folder_of(const fs::path& file) {
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+/// The first is FILE.damaged.
+fs::path aside(const fs::path& file, int number) {
+  return file.string() + ".damaged" + (number == 1 ? "" : "-" + std::to_string(number));
+}
+
+/// Also where one between them was taken away.
+std::vector<std::string> lying_aside(const fs::path& file) {
+  std::vector<std::string> there;
   std::error_code failed;
-  for (const char* part : {"-wal", "-shm"}) fs::remove(file.string() + ".damaged" + part, failed);
-  fs::rename(file, file.string() + ".damaged", failed);
-  if (failed) return false;
-  fs::rename(file.string() + "-wal", file.string() + ".damaged-wal", failed);  // may be missing
+  for (const auto& entry : fs::directory_iterator(folder_of(file), failed)) {
+    const auto name = entry.path().filename().string();
+    const bool is_part = name.ends_with("-wal") || name.ends_with("-shm");
+    if (name.starts_with(aside(file, 1).filename().string()) && !is_part) there.push_back(entry.path().string());
+  }
+  std::ranges::sort(there);
+  return there;
+}
+
+/// Beside those of before, which may hold reports that nobody has yet; empty = cannot be moved.
+fs::path move_aside(const fs::path& file) {
+  std::error_code failed;
+  int number = 1;
+  while (fs::exists(aside(file, number), failed)) ++number;
+  const auto to = aside(file, number);
+  fs::rename(file, to, failed);
+  if (failed) return {};
+  for (const char* part : {"-wal", "-shm"}) fs::remove(to.string() + part, failed);  // of nobody's
+  fs::rename(file.string() + "-wal", to.string() + "-wal", failed);                  // may be missing
   fs::remove(file.string() + "-shm", failed);
-  return true;
+  return to;
+}
+
+/// SQLite's words for it are an error of the disk.
+bool disk_is_read_only(const fs::path& file) {
+  struct statvfs disk {};
+  return statvfs(folder_of(file).c_str(), &disk) == 0 && (disk.f_flag & ST_RDONLY) != 0;
 }
 
 }  // namespace
@@ -41,7 +76,9 @@ struct ReportStore::Database {
   std::string file;
   bool check_failed = false;  // SQLite itself calls that no error
 
-  [[nodiscard]] core::Error error() const { return {file + ": " + sqlite3_errmsg(handle.get()) + "."}; }
+  [[nodiscard]] core::Error error() const {
+    return {file + ": " + sqlite3_errmsg(handle.get()) + (disk_is_read_only(file) ? "; its disk is read-only." : ".")};
+  }
   [[nodiscard]] bool damaged() const {
     const int code = sqlite3_errcode(handle.get());
     return check_failed || code == SQLITE_CORRUPT || code == SQLITE_NOTADB;
@@ -99,17 +136,31 @@ uint64_t ReportStore::new_stream() {
 
 core::Result<ReportStore> ReportStore::open(const fs::path& file) {
   ReportStore store;
+  const auto before = lying_aside(file);
+  if (!before.empty()) {
+    store.remark_ = "Damaged stores of unsent reports lie in " + core::joined(before) +
+                    ": look at what can be read of them, then take them away.";
+  }
   const auto begun = store.begin(file);
   if (begun.ok()) return store;
   const bool damaged = store.database_->damaged();
+  const auto counted = damaged ? store.counted() : "";
   store.database_.reset();
   if (!damaged) return begun.error();
   // SQLite calls it damage when the disk gives EIO, too: it may be whole.
   if (const auto whole = core::read_whole(file); !whole.ok()) return whole.error();
-  if (!move_aside(file)) return begun.error();
+  const auto to = move_aside(file);
+  if (to.empty()) return begun.error();
   if (const auto again = store.begin(file); !again.ok()) return again.error();
-  store.problem_ = "The store of unsent reports was damaged: it was moved to " + file.string() + ".damaged.";
+  store.problem_ =
+      "The store of unsent reports was damaged: it was moved to " + to.string() + ", with " + counted + " in it.";
   return store;
+}
+
+std::string ReportStore::counted() const {
+  const auto count = database_->prepare("SELECT count(*) FROM report");
+  const bool known = count && sqlite3_step(count.get()) == SQLITE_ROW;
+  return known ? std::to_string(sqlite3_column_int64(count.get(), 0)) + " reports" : "reports that cannot be counted";
 }
 
 core::Result<uint64_t> ReportStore::append(std::span<const uint8_t> report) {

@@ -16,13 +16,16 @@ namespace railfix::tpr_publisher {
 
 class ReportStore {
  public:
-  /// Makes the file when it is missing. One that can be read and is damaged is moved aside (FILE.damaged) and a new one
-  /// begun.
+  /// Makes the file when it is missing. One that can be read and is damaged is moved aside (FILE.damaged, or
+  /// FILE.damaged-2, -3, ... beside those of before) and a new one begun.
   static core::Result<ReportStore> open(const std::filesystem::path& file);
 
   /// Empty, or that a damaged file was moved aside.
   [[nodiscard]] const std::string& problem() const { return problem_; }
-  /// Random, for the life of the file: sequence numbers begin anew in another one.
+  /// Files that were moved aside before and lie there still; empty = none.
+  [[nodiscard]] const std::string& remark() const { return remark_; }
+  /// Random, for the life of the file: of reports that an earlier version stored, without a stream and number of
+  /// theirs.
   [[nodiscard]] uint64_t stream() const { return stream_; }
   /// One that nobody else has.
   static uint64_t new_stream();
@@ -39,8 +42,10 @@ class ReportStore {
   struct Database;
   ReportStore() = default;
   core::Status begin(const std::filesystem::path& file);
+  [[nodiscard]] std::string counted() const;
   std::shared_ptr<Database> database_;
   std::string problem_;
+  std::string remark_;
   uint64_t stream_ = 0;
 };
 

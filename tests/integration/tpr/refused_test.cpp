@@ -57,7 +57,7 @@ TEST_F(RefusedReports, WaitInTheStoreUntilTheListOfRightsIsMended) {
   ASSERT_TRUE(run_until([&] { return status_->state() == msg::STATE_ACTIVE; }, each)) << reason();
   const auto arrived = ground.reports();
   for (size_t i = 0; i < 6; ++i) {
-    EXPECT_EQ(arrived[i].sequence, i + 1);
+    EXPECT_EQ(arrived[i].sequence, i % 3 + 1) << "numbered by each start anew";
     EXPECT_EQ(arrived[i].stamp_ns, reports_[i].stamp_ns());
   }
 }

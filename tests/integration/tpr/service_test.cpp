@@ -218,7 +218,7 @@ TEST_F(TprService, HearsTheOnboardCommand) {
   const auto kept = [&] { return test::slurp(notes_file()); };
   EXPECT_THAT(kept(), HasSubstr("3A80908303E82103E9"));
   input.say("packet_58=none");
-  ASSERT_TRUE(run_until([&] { return kept().empty(); }, [&] { write_state(450); }))
+  ASSERT_TRUE(run_until([&] { return kept().starts_with('\n'); }, [&] { write_state(450); }))
       << "it does not outlive the service";
   input.say("report=session");
   ASSERT_TRUE(reported(msg::REPORT_SESSION));
@@ -236,6 +236,32 @@ TEST_F(TprService, HearsTheOnboardCommand) {
   EXPECT_EQ(onboard.end(SIGTERM), 0);
   EXPECT_TRUE(run_until([&] { return reason().find("onboard_status is silent") != std::string::npos; },
                         [&] { write_state(450); }));
+}
+
+// As if the clock had been set back by an hour between the two processes.
+TEST_F(TprService, TrainborneTimeIsLaterThanOfTheProcessBefore) {
+  const auto each = [&] { write_state(450); };
+  const auto steps = [](int64_t time_ns) { return time_ns / 10'000'000 % etcs::kUnknownTime; };
+  const auto t_train = [&] {
+    const auto& report = reports_.back();
+    return etcs::decode({report.message().data(), report.message_bytes()}, etcs::Baseline::b3).value().t_train;
+  };
+  auto program = std::make_unique<test::Program>(service());
+  ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
+  ASSERT_TRUE(run_until([&] { return !reports_.empty(); }, each));
+  const auto kept = [&] { return test::slurp(notes_file()); };
+  ASSERT_TRUE(run_until([&] { return kept().size() > 1; }, each));
+  const int64_t said_ns = std::stoll(kept());
+  EXPECT_EQ(t_train(), steps(said_ns));
+  program.reset();
+  ASSERT_TRUE(run_until([&] { return states_.matched_readers() == 0; }, [] {}));
+  const int64_t later_ns = said_ns + 3600 * core::kNsPerSecond;
+  std::ofstream(notes_file()) << '\n' << later_ns;
+  const size_t before = reports_.size();
+  program = std::make_unique<test::Program>(service());
+  ASSERT_TRUE(run_until([&] { return connected() && states_.matched_readers() > 0; }, [] {}));
+  ASSERT_TRUE(run_until([&] { return reports_.size() > before; }, each));
+  EXPECT_EQ(t_train(), steps(later_ns) + 1);
 }
 
 // The trackside sends it once, with locations that count from the LRBG of that moment. It outlives the service, with

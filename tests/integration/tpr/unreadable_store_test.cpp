@@ -97,6 +97,34 @@ TEST_F(UnreadableStore, WhatStaysUnreadableHoldsNewerReportsUpOnlyForAWhile) {
   EXPECT_TRUE(wait_for([&] { return ground_->count() == kReports + 1; })) << "given up, not thrown away";
 }
 
+TEST_F(UnreadableStore, WhatLiesInAStoreThatCannotBeOpenedAtTheStartGoesBeforeWhatIsNew) {
+  disk_fails = true;
+  tpr_publisher::GroundLink link(settings_);
+  ASSERT_TRUE(broker_.start());
+  link.send(report(kReports + 1));
+  ASSERT_TRUE(wait_for([&] { return link.connected() && says(link, "Reports go from memory: 1 wait there"); }))
+      << link.trouble();
+  EXPECT_FALSE(link.stores());
+  EXPECT_EQ(ground_->count(), 0U);
+  disk_fails = false;
+  ASSERT_TRUE(wait_for([&] { return ground_->count() == kReports + 1; })) << link.trouble();
+  const auto arrived = ground_->reports();
+  for (uint64_t i = 0; i <= kReports; ++i) ASSERT_EQ(arrived[i].stamp_ns, static_cast<int64_t>(i + 1));
+  EXPECT_TRUE(wait_for([&] { return link.trouble().empty() && link.stores(); })) << link.trouble();
+}
+
+TEST_F(UnreadableStore, AStoreThatStaysShutHoldsNewReportsUpOnlyForAWhile) {
+  settings_.read_patience = std::chrono::seconds(1);
+  disk_fails = true;
+  tpr_publisher::GroundLink link(settings_);
+  ASSERT_TRUE(broker_.start());
+  link.send(report(kReports + 1));
+  ASSERT_TRUE(wait_for([&] { return ground_->count() == 1; })) << link.trouble();
+  disk_fails = false;
+  ASSERT_TRUE(wait_for([&] { return ground_->count() == kReports + 1; })) << link.trouble();
+  EXPECT_EQ(ground_->missing(), 0U);
+}
+
 TEST_F(UnreadableStore, AStoreThatCannotBeReadAtTheStartIsNotTakenForADamagedOne) {
   disk_fails = true;
   const auto store = tpr_publisher::ReportStore::open(settings_.store);

@@ -52,8 +52,26 @@ TEST(Broker, IsHostOrHostAndPort) {
   ASSERT_TRUE(parse_broker("10.0.0.7:8883", options).ok());
   EXPECT_EQ(options.host, "10.0.0.7");
   EXPECT_EQ(options.port, 8883);
-  for (const char* wrong : {"", ":1883", "host:", "host:0", "host:65536", "host:18x"})
+  for (const char* wrong : {"", ":1883", "host:", "host:0", "host:65536", "host:18x", "mqtt://host:1883", "[::1", "[]",
+                            "[host]:1883", "[::1]1883", "[::1]:", "2001:db8::1:18830"})
     EXPECT_THAT(parse_broker(wrong, options).error().message, HasSubstr("localhost:1883")) << wrong;
+}
+
+TEST(Broker, MayBeAnIpv6Address) {
+  for (const char* text : {"::1", "[::1]", "[::1]:8883", "2001:db8::17", "[fe80::1%eth0]:8883"}) {
+    MqttOptions options;
+    ASSERT_TRUE(parse_broker(text, options).ok()) << text;
+    const bool with_port = std::string_view(text).ends_with(":8883");
+    EXPECT_EQ(options.port, with_port ? 8883 : 1883);
+    MqttOptions again;
+    ASSERT_TRUE(parse_broker(broker_of(options), again).ok()) << broker_of(options);
+    EXPECT_EQ(again.host, options.host);
+    EXPECT_EQ(again.port, options.port);
+  }
+  MqttOptions options;
+  ASSERT_TRUE(parse_broker("[::1]:8883", options).ok());
+  EXPECT_EQ(options.host, "::1");
+  EXPECT_EQ(broker_of(options), "[::1]:8883");
 }
 
 }  // namespace

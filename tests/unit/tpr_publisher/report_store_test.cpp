@@ -2,9 +2,12 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sched.h>
+#include <sys/mount.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
 #include <fstream>
 #include <iostream>
@@ -139,6 +142,55 @@ TEST_F(Store, ACutFileIsMovedAsideOrReadable) {
     ASSERT_EQ(fs::file_size(folder_ / "reports.db.damaged"), cut);
   }
   EXPECT_GT(aside, 0);
+}
+
+TEST_F(Store, WhatIsMovedAsideIsCountedWhereItCanBeAndNeverLost) {
+  for (const char* aside : {"reports.db.damaged", "reports.db.damaged-2", "reports.db.damaged-3"}) {
+    {
+      auto store = opened(file_);
+      for (uint64_t i = 1; i <= 60; ++i) ASSERT_TRUE(store.append(report_of(i)).ok());
+    }
+    {  // the page behind the first of the reports: the number of rows stands elsewhere
+      std::fstream stream(file_, std::ios::binary | std::ios::in | std::ios::out);
+      stream.seekp(static_cast<std::streamoff>(fs::file_size(file_) - 1020));
+      stream << std::string(40, '\xFF');
+    }
+    const auto store = opened(file_);
+    EXPECT_THAT(store.problem(), HasSubstr("moved to " + (folder_ / aside).string() + ", with "));
+    EXPECT_GT(fs::file_size(folder_ / aside), 1000U);
+  }
+  fs::remove(folder_ / "reports.db.damaged-2");
+  const auto store = opened(file_);
+  EXPECT_EQ(store.problem(), "");
+  EXPECT_THAT(store.remark(), HasSubstr("reports.db.damaged, "));
+  EXPECT_THAT(store.remark(), HasSubstr("reports.db.damaged-3: look at"));
+}
+
+// A disk that the system has remounted after errors.
+TEST_F(Store, OfAReadOnlyDiskItSaysSo) {
+  int said[2];
+  ASSERT_EQ(pipe(said), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    const bool may = unshare(CLONE_NEWNS) == 0 && mount("", "/", "", MS_REC | MS_PRIVATE, nullptr) == 0 &&
+                     mount("disk", folder_.c_str(), "tmpfs", 0, nullptr) == 0;
+    if (!may) _exit(2);
+    { opened(file_); }
+    if (mount("disk", folder_.c_str(), "tmpfs", MS_REMOUNT | MS_RDONLY, nullptr) != 0) _exit(2);
+    const auto store = ReportStore::open(file_);
+    const std::string text = store.ok() ? "" : store.error().message;
+    _exit(write(said[1], text.data(), text.size()) == static_cast<ssize_t>(text.size()) ? 0 : 1);
+  }
+  close(said[1]);
+  std::array<char, 1000> text{};
+  const auto bytes = read(said[0], text.data(), text.size() - 1);
+  close(said[0]);
+  int status = 0;
+  waitpid(child, &status, 0);
+  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "may mount nothing";
+  ASSERT_GE(bytes, 0);
+  EXPECT_THAT(text.data(), HasSubstr("reports.db: "));
+  EXPECT_THAT(text.data(), HasSubstr("; its disk is read-only."));
 }
 
 TEST_F(Store, ADamagedReportIsNotSent) {

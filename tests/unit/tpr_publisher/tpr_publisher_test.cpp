@@ -50,12 +50,18 @@ TEST(TprPublisher, OldPositionsAreNotReported) {
   EXPECT_EQ(outcome.report->reason, Reason::start);
 }
 
-TEST(TprPublisher, SilenceOfTheStateIsSaidWhenAReportIsDue) {
+TEST(TprPublisher, SilenceOfTheStateIsSaidWhetherAReportIsDueOrNot) {
   TprPublisher publisher(balise_map(), settings());
   EXPECT_THAT(publisher.tick(kStart).refusal, HasSubstr("no train_state yet"));
   ASSERT_TRUE(publisher.update(at(forward(1, 450), 0, 20), kStart).report.has_value());
-  EXPECT_EQ(publisher.tick(kStart + 5 * core::kNsPerSecond).refusal, "");  // nothing due
-  EXPECT_THAT(publisher.tick(kStart + 7 * core::kNsPerSecond).refusal, HasSubstr("7.0 s old"));
+  EXPECT_EQ(publisher.tick(kStart + core::to_ns(0.9)).refusal, "");
+  const std::string old = "the last train_state is 5.0 s old, the limit is 1 s.";
+  EXPECT_EQ(publisher.tick(kStart + 5 * core::kNsPerSecond).refusal, "No position report can be sent: " + old);
+  EXPECT_EQ(publisher.update(at(forward(1, 450), 0, 20), kStart + 5 * core::kNsPerSecond).refusal,
+            "No position report can be sent: " + old)
+      << "nor of one that comes so late";
+  EXPECT_THAT(publisher.tick(kStart + 7 * core::kNsPerSecond).refusal,
+              HasSubstr("not sent: the last train_state is 7.0 s"));
   EXPECT_FALSE(publisher.tick(kStart + 7 * core::kNsPerSecond).report.has_value());
 }
 
@@ -250,6 +256,35 @@ TEST(TprPublisher, TrainborneTimeGoesOnWhereAnotherOneReported) {
     said.push_back(publisher.update(position, position.stamp_ns).report.value().fields.t_train);
   }
   EXPECT_THAT(said, ElementsAre(t_train(0.91), t_train(6.91)));
+}
+
+TEST(TprPublisher, TrainborneTimeGoesOnWhereAProcessBeforeReported) {
+  TprPublisher publisher(balise_map(), settings());
+  EXPECT_EQ(publisher.trainborne_ns(), 0);
+  publisher.go_on_after(kStart + core::to_ns(3600));
+  const auto report = publisher.update(at(forward(1, 150), 0, 0), kStart).report.value();
+  EXPECT_EQ(report.fields.t_train, tpr_publisher::t_train(kStart + core::to_ns(3600.01)));
+  EXPECT_EQ(publisher.trainborne_ns(), kStart + core::to_ns(3600.01));
+}
+
+// 4.0.0 3.6.5.2.5: also when another one than the one that is in charge now has said it.
+TEST(TprPublisher, AConfirmationThatAnotherOneReportedIsNotReportedAgain) {
+  auto four = settings();
+  four.report.baseline = etcs::Baseline::b4;
+  for (const bool heard : {false, true}) {
+    TprPublisher standby(balise_map(), four);
+    standby.watch(at(forward(1, 150), 0, 10), kStart);
+    Onboard onboard;
+    onboard.stamp_ns = kStart + core::to_ns(0.2);
+    onboard.integrity_ns = kStart + core::to_ns(0.1);
+    onboard.q_integrity = etcs::kConfirmedByDriver;
+    onboard.train_length_m = 100;
+    ASSERT_TRUE(standby.set_onboard(onboard, onboard.stamp_ns).ok());
+    if (heard) standby.hear_confirmed(kStart + core::to_ns(0.2));  // of a state that has not come here yet
+    standby.watch(at(forward(1, 152), 0.2, 10), kStart + core::to_ns(0.2));
+    const auto report = standby.update(at(forward(1, 160), 1, 10), kStart + core::to_ns(1)).report.value();
+    EXPECT_EQ(report.fields.q_length, heard ? etcs::kNoIntegrityInformation : etcs::kConfirmedByDriver);
+  }
 }
 
 TEST(TprPublisher, TrainborneTimeIsNotBeforeThePosition) {

@@ -201,5 +201,26 @@ TEST(TrainIntegrity, APlaceThatWasLostNeedsAnotherConfirmation) {
   EXPECT_FALSE(integrity.forgotten());
 }
 
+// The other one's report may come here before the place that it was made of.
+TEST(TrainIntegrity, WhatAnotherOneHasReportedIsUsedUp) {
+  TrainIntegrity integrity;
+  integrity.follow({at(1), 0, 0, true});
+  integrity.hear(etcs::kConfirmedByDriver, at(1), 100);
+  ASSERT_EQ(integrity.said(0).q_length, etcs::kConfirmedByDriver);
+  integrity.hear(etcs::kConfirmedByDriver, at(2), 100);
+  integrity.use_up_until(at(1.5));
+  EXPECT_EQ(integrity.said(0).q_length, etcs::kNoIntegrityInformation) << "the first; the second has no place yet";
+  integrity.follow({at(2.5), 10, 0, true});
+  EXPECT_EQ(integrity.said(10).q_length, etcs::kConfirmedByDriver) << "the second";
+  integrity.use_up_until(at(1.5));
+  EXPECT_EQ(integrity.said(10).q_length, etcs::kConfirmedByDriver) << "a late word of the first";
+  integrity.hear(etcs::kConfirmedByDriver, at(3), 100);
+  integrity.hear(etcs::kConfirmedByDriver, at(3.1), 100);
+  integrity.use_up_until(at(3.2));
+  EXPECT_EQ(integrity.said(10).q_length, etcs::kNoIntegrityInformation);
+  integrity.follow({at(3.3), 18, 0, true});
+  EXPECT_EQ(integrity.said(18).q_length, etcs::kNoIntegrityInformation) << "nor once it has its place";
+}
+
 }  // namespace
 }  // namespace railfix::tpr_publisher
