@@ -253,11 +253,11 @@ bool Estimator::confirms_start(bool tells_track) {
   return tells_track;
 }
 
-// Where masts stand everywhere some stand by chance where the map has them: map_matcher knows how many; GNSS is never
-// so far off.
+// Any number of masts fits where others stand as far apart: map_matcher says when no other place near would have given
+// the same. GNSS is never so far off.
 void Estimator::confirm_by(const FixInput& landmark) {
   if (is_only_told() && !confirms_start(landmark.tells_track)) return;
-  const bool confirms = landmark.sightings_fit == SightingsFit::here || place_.landmarks_agreed >= kLandmarksBelieved;
+  const bool confirms = landmark.sightings_fit == SightingsFit::here;
   if (place_.told_by != ToldBy::start || confirms) place_.told_by = ToldBy::nobody;
 }
 
