@@ -49,7 +49,7 @@ bool is_alike(const Met& met, double seen_aside_m, const Landmark& landmark) {
   if (met.kind != landmark.kind || met.off_m > kAlongAlikeM + kAlongSigmas * sigma_m) return false;
   if (landmark.lateral_m == 0 || met.lateral_m == 0) return true;  // not known
   if (std::abs(seen_aside_m) > kFarthestAsideM) return false;
-  if (is_aside_known(landmark.lateral_m) && is_aside_known(met.lateral_m))
+  if (is_aside_measured(landmark) && is_aside_measured(*met.landmark))
     return std::abs(seen_aside_m - landmark.lateral_m) < kAcrossAlikeM;
   return (seen_aside_m > 0) == (landmark.lateral_m > 0);
 }

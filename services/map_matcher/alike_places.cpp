@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "track/aside.hpp"
-
 namespace railfix::map_matcher {
 namespace {
 
@@ -19,8 +17,7 @@ std::vector<double> shifts_that_fit_one(const SightingHistory& history, const tr
   for (const auto& seen : history.seen()) {
     for (const auto* mark :
          landmarks_of_kind(path, seen.sighting.kind, seen.place_m + least_m, seen.place_m + most_m)) {
-      if (track::fits_aside(seen.sighting.lateral_m, mark->lateral_m))
-        shifts.push_back(mark->distance_m - seen.place_m);
+      if (fits_aside(seen.sighting, *mark)) shifts.push_back(mark->distance_m - seen.place_m);
     }
   }
   std::ranges::sort(shifts);

@@ -5,7 +5,6 @@
 
 #include "map_matcher/alike_places.hpp"
 #include "map_matcher/inputs.hpp"
-#include "track/aside.hpp"
 
 namespace railfix::map_matcher {
 namespace {
@@ -30,7 +29,7 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   if (!begun_m_) begun_m_ = prior.travelled_m;
   const bool again = history_.make_room(sighting, place_m);
   auto candidates = landmarks_of_kind(*path_, sighting.kind, window.from_m, window.to_m);
-  std::erase_if(candidates, [&](const auto* mark) { return !track::fits_aside(sighting.lateral_m, mark->lateral_m); });
+  std::erase_if(candidates, [&](const auto* mark) { return !fits_aside(sighting, *mark); });
   if (candidates.size() > kMostCandidates) {
     history_.add(sighting, place_m);  // for when the window is smaller, or for those of a rarer kind
     return std::nullopt;

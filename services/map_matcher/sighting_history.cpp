@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "track/aside.hpp"
-
 namespace railfix::map_matcher {
 namespace {
 
@@ -109,7 +107,7 @@ double SightingHistory::sighting_fits(const track::Path& path, const Seen& seen,
   const double by_chance = unmapped_per_m(seen.sighting.kind) + (1 - seen.sighting.confidence) * per_m;
   double density = by_chance;
   for (const auto* landmark : mapped) {
-    if (!track::fits_aside(seen.sighting.lateral_m, landmark->lateral_m)) continue;
+    if (!fits_aside(seen.sighting, *landmark)) continue;
     const double off_m = landmark->distance_m - path_m;
     const double moved = std::abs(off_m) < parameters_.moved_m ? parameters_.moved / (2 * parameters_.moved_m) : 0.0;
     const double relative_m = relative_sigma_m(seen, landmark->landmark->sigma_m, now_m);

@@ -10,6 +10,7 @@
 
 #include "map_matcher/landmark_parameters.hpp"
 #include "map_matcher/match_types.hpp"
+#include "track/aside.hpp"
 #include "track/path.hpp"
 
 namespace railfix::map_matcher {
@@ -86,6 +87,10 @@ class SightingHistory {
   std::map<track::LandmarkKind, UnmappedRate> unmapped_;
 };
 
+/// As far aside.
+[[nodiscard]] inline bool fits_aside(const Sighting& sighting, const track::PathLandmark& mark) {
+  return track::fits_aside(sighting.lateral_m, mark.lateral_m, track::is_aside_measured(*mark.landmark));
+}
 /// Mapped landmarks of a kind between two places of a path.
 [[nodiscard]] std::vector<const track::PathLandmark*> landmarks_of_kind(const track::Path& path,
                                                                         track::LandmarkKind kind, double from_m,

@@ -93,8 +93,8 @@ TEST(TracksBeside, AMastWithoutASideMayBeTheSameOne) {
   map->edges = {{1, "a", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})},
                 {2, "b", 3, 4, "", track::Alignment::chained({4, 0, 0}, {{1000, 0, 0}})}};
   for (const auto& [other_m, is_alike] : {std::pair(3.1, true), {0.0, true}, {-3.1, false}}) {
-    map->landmarks = {{1, track::LandmarkKind::mast, 1, 500, 3.1, 3, ""},
-                      {2, track::LandmarkKind::mast, 2, 500, other_m, 3, ""}};
+    map->landmarks = {{1, track::LandmarkKind::mast, 1, 500, 3.1, 0.1, ""},
+                      {2, track::LandmarkKind::mast, 2, 500, other_m, 0.1, ""}};
     EXPECT_EQ(track::TracksBeside(map).has_alike(map->landmarks[0]), is_alike) << other_m;
   }
 }
@@ -105,11 +105,12 @@ TEST(TracksBeside, AMastBeyondItsTrackIsTheSameOneFromTheOtherWhereNobodyMeasure
   map->edges = {{1, "a", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})},
                 {2, "b", 3, 4, "", track::Alignment::chained({4, 0, 0}, {{1000, 0, 0}})},
                 {3, "c", 5, 6, "", track::Alignment::chained({-8, 1000, core::kPi}, {{1000, 0, 0}})}};
-  const auto is_alike = [&](double lateral_m) {
-    map->landmarks = {{1, track::LandmarkKind::mast, 1, 500, lateral_m, 3, ""}};
+  const auto is_alike = [&](double lateral_m, double sigma_m = 0.1) {
+    map->landmarks = {{1, track::LandmarkKind::mast, 1, 500, lateral_m, sigma_m, ""}};
     return track::TracksBeside(map).has_alike(map->landmarks[0]);
   };
   EXPECT_TRUE(is_alike(track::kMastBesideM));
+  EXPECT_TRUE(is_alike(3.1, 3)) << "drawn to metres";
   EXPECT_FALSE(is_alike(3.1)) << "7.1 m aside nobody takes it for one at 3.1 m";
   EXPECT_FALSE(is_alike(-2)) << "between both";
   EXPECT_TRUE(is_alike(0));

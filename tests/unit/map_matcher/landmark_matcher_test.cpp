@@ -178,10 +178,11 @@ TEST(LandmarkMatcher, APlaceThatWasConfirmedIsDoubtedWhereTheMapGoesOnOtherwise)
 
 // From each of two tracks 4.2 m apart a train sees the masts of both.
 TEST(LandmarkMatcher, AMastBeyondTheTrackBesideIsNotTheOneOfTheOwnTrack) {
-  const auto is_fix = [](double seen_m, double mapped_m) {
+  const auto is_fix = [](double seen_m, double mapped_m, double map_sigma_m = 0.1) {
     auto map = marked_line({{LandmarkKind::mast, 500}});
     auto changed = std::make_shared<track::Map>(*map);
     changed->landmarks[0].lateral_m = mapped_m;
+    changed->landmarks[0].sigma_m = map_sigma_m;
     LandmarkMatcher matcher({}, path_along(changed));
     Sighting sighting = sighting_of(LandmarkKind::mast);
     sighting.lateral_m = seen_m;
@@ -192,6 +193,8 @@ TEST(LandmarkMatcher, AMastBeyondTheTrackBesideIsNotTheOneOfTheOwnTrack) {
   EXPECT_FALSE(is_fix(-3.1, 3.1));
   EXPECT_TRUE(is_fix(5, track::kMastBesideM)) << "the source said the side alone";
   EXPECT_FALSE(is_fix(7.2, track::kMastBesideM));
+  EXPECT_TRUE(is_fix(5, 3.1, 3)) << "drawn to metres";
+  EXPECT_FALSE(is_fix(7.2, 3.1, 3));
   EXPECT_TRUE(is_fix(7.3, 0)) << "not known";
 }
 
