@@ -171,8 +171,10 @@ SurveyedLandmark known_landmark(const track::Map& map, const Thing& thing, const
   const track::Landmark& known = *thing.known;
   found.known_id = known.id;
   found.landmark = known;
-  if (has_side(known.kind) && known.lateral_m == 0 && one_side(thing, all))
-    found.landmark.lateral_m = mean_lateral_m(thing, all);
+  // Once its sigma is that of a survey nobody takes its distance aside for a guess any more.
+  const double seen_m = mean_lateral_m(thing, all);
+  if (has_side(known.kind) && !track::is_aside_measured(known) && seen_m != 0 && one_side(thing, all))
+    found.landmark.lateral_m = seen_m;
   if (thing.is_apart) {
     found.runs_apart = runs_apart(thing, all, solver, place.place_m);
     found.apart_m = place.place_m - known.offset_m;

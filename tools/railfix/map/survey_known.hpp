@@ -14,8 +14,9 @@ inline bool has_side(track::LandmarkKind kind) {
 }
 
 /// Same kind, same track, as far aside: the masts of the track beside are seen as well.
-inline bool alike(const SurveySighting& a, track::LandmarkKind kind, uint32_t edge, double lateral_m) {
-  return a.kind == kind && a.edge == edge && (!has_side(kind) || track::fits_aside(a.lateral_m, lateral_m));
+inline bool alike(const SurveySighting& a, track::LandmarkKind kind, uint32_t edge, double lateral_m,
+                  bool measured = true) {
+  return a.kind == kind && a.edge == edge && (!has_side(kind) || track::fits_aside(a.lateral_m, lateral_m, measured));
 }
 
 inline constexpr double kOnePassM = 50;  // of a run: no thing is passed twice within it, ...
