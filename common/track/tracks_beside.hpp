@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "track/track_finder.hpp"
+#include "track/ways.hpp"
 
 namespace railfix::track {
 
@@ -17,7 +18,7 @@ struct TrackBeside : NearTrack {
 class TracksBeside {
  public:
   /// REQUIRES: the map does not change any more.
-  explicit TracksBeside(std::shared_ptr<const Map> map) : map_(std::move(map)), finder_(map_) {}
+  explicit TracksBeside(std::shared_ptr<const Map> map) : map_(std::move(map)), finder_(map_), junctions_(*map_) {}
 
   /// The other tracks within 15 m of the place, abeam of it. Drawings (edges that lie nowhere) say nothing of that:
   /// none. REQUIRES: the edge is on the map.
@@ -25,16 +26,21 @@ class TracksBeside {
   [[nodiscard]] bool any_at(const EdgePosition& place) const { return !beside(place).empty(); }
   /// More than one track runs within 15 m of the point (metres of the map).
   [[nodiscard]] bool many_at(double easting_m, double northing_m) const;
-  /// A track within 15 m has one of its kind where a train on it would see it alike: as far along and as far to the
-  /// side.
+  /// A train on a track within 15 m would sight it, or one of its kind, as far along and as far to the side as a train
+  /// on its own track sights it. Where the map does not know how far aside something stands, whatever would be sighted
+  /// on that side is alike.
   [[nodiscard]] bool has_alike(const Landmark& landmark) const;
 
  private:
   /// Tracks abeam of a point; what lies beyond an edge's end is not.
   [[nodiscard]] std::vector<NearTrack> abeam(double easting_m, double northing_m) const;
 
+  /// From a train on that track.
+  [[nodiscard]] bool has_alike(const Landmark& landmark, const TrackBeside& track) const;
+
   std::shared_ptr<const Map> map_;
   TrackFinder finder_;
+  Junctions junctions_;
 };
 
 }  // namespace railfix::track

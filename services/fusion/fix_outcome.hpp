@@ -14,8 +14,8 @@ struct FixOutcome {
   enum class Verdict : uint8_t { none, used, corrected, refused };
   Verdict verdict = Verdict::none;
   Offer offer;  // by how far it was from where it was expected
-  bool again =
-      false;  // of a landmark that was met before, since when little was forgotten: it says hardly anything new
+  /// Of a landmark that was met before, since when little was forgotten: it says hardly anything new.
+  bool again = false;
 
   [[nodiscard]] bool used() const { return verdict == Verdict::used || corrected(); }
   /// Used against the filter's word, because the one before, which was refused, says the same.

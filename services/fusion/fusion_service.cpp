@@ -129,7 +129,7 @@ void FusionService::keep(const msg::TrainState& state) {
 // only just been made, or has been told its place, and this state is of the one that did not know; or it is not certain
 // yet whether the place is of this ride.
 bool FusionService::take_over(const TrainEstimate& first) {
-  const msg::TrainState& state = known_->state;
+  const msg::TrainState state = known_->state;
   const double age_s = core::seconds(first.stamp_ns - state.stamp_ns());
   if (known_->noted_ns) {
     // Of the same ride: neither the clock nor a replay has jumped since, nor has another one begun.

@@ -22,9 +22,15 @@ constexpr double kTurnSigmasOfTwo = 2.0;  // without the worst second
 
 void MapPlace::start_on(std::shared_ptr<const track::Path> path, const TrainMotion& motion) {
   known_.path = std::move(path);
-  known_.told.tell(ToldBy::start);
-  known_.told_m = motion.distance_m();
+  tell(ToldBy::start, motion);
   doubt_points_behind(motion);
+}
+
+void MapPlace::tell(ToldBy by, const TrainMotion& motion) {
+  known_.told.tell(by);
+  known_.told_m = motion.distance_m();
+  known_.told_sigma_m = motion.filter().path_sigma_m();
+  known_.gnss_agreed = false;
 }
 
 // The train may stand in front of points that the place which was told lies behind.
@@ -59,7 +65,7 @@ void MapPlace::give_up(Against because) {
   claimed_ = {};
   gnss_.watch = {};
   gnss_.agreed = 0;
-  gnss_.agreed_on_way = false;
+  gnss_.contradicts_direction = false;
   landmarks_ = {};
   curves_ = {};
   refused_.reset();

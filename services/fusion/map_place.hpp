@@ -90,7 +90,9 @@ class MapPlace {
   [[nodiscard]] const SensorWatch& landmarks() const { return landmarks_; }
   [[nodiscard]] const SensorWatch& curves() const { return curves_; }
   /// GNSS has agreed with the motion for a while, and with a place that it had not given itself.
-  [[nodiscard]] bool gnss_proven() const { return gnss_.agreed >= kGnssProof && known_.told.by() != ToldBy::gnss; }
+  [[nodiscard]] bool gnss_proven() const {
+    return gnss_.agreed >= kGnssProof && known_.told.by() != ToldBy::gnss && !may_be_turned_round();
+  }
   /// GNSS, which has never agreed with it under way, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies() const;
   /// What GNSS that agrees with the motion may still be wrong by.
@@ -116,7 +118,9 @@ class MapPlace {
     TurnedWay turned_way;
     WrongPlace wrong_place;
     OtherWays other_ways;
-    double told_m = 0;  // the distance run when it was told
+    double told_m = 0;         // the distance run when it was told ...
+    double told_sigma_m = 0;   // ... and how well it was known then
+    bool gnss_agreed = false;  // with where the cab looks there, too
     uint32_t reference = 0;
     double fix_m = 0;                // the distance run at the last fix that settled what was in doubt ...
     double reference_m = 0;          // ... and at the reference
@@ -129,10 +133,10 @@ class MapPlace {
   };
   struct Gnss {
     SensorWatch watch;
-    int agreed = 0;              // fixes, since three in a row were refused or one had no place
-    bool agreed_on_way = false;  // behind some way since the place was told
-    bool was_proven = false;     // when three in a row were
-    Sides held;                  // where it contradicts a wheel alone, it says that the train is so far away
+    int agreed = 0;                      // fixes, since three in a row were refused or one had no place
+    bool contradicts_direction = false;  // its last word, where it tells where the cab looks
+    bool was_proven = false;             // when three in a row were
+    Sides held;                          // where it contradicts a wheel alone, it says that the train is so far away
   };
 
   void use_track(const FixInput& fix, const TrainMotion& motion);
@@ -143,6 +147,7 @@ class MapPlace {
   Offer offer_again(const MeasuredPlace& place, MotionFilter& filter) const;
   [[nodiscard]] bool has_met(uint32_t landmark) const;
   [[nodiscard]] bool may_fit_by_chance(const FixInput& fix) const;
+  void speak_for_track(const FixInput& fix, bool by_chance, const TrainMotion& motion);
   void accept(const FixInput& fix, const FixContext& context, TrainMotion& motion);
   void settle(const FixInput& fix, const FixContext& context, TrainMotion& motion);
   void mark_reference(const FixInput& fix, const TrainMotion& motion);
@@ -156,7 +161,10 @@ class MapPlace {
 
   [[nodiscard]] bool may_be_beyond(double end_m, const TrainMotion& motion) const;
   [[nodiscard]] bool is_off_map(const TrainMotion& motion) const;
-  [[nodiscard]] bool tells_direction(double gnss_sigma_m, const TrainMotion& motion) const;
+  [[nodiscard]] bool tells_direction(double sigma_m, const TrainMotion& motion) const;
+  /// It was told, and nothing has shown yet that the cab looks as it was told.
+  [[nodiscard]] bool may_be_turned_round() const { return known_.told.may_be_elsewhere() && !known_.gnss_agreed; }
+  void tell(ToldBy by, const TrainMotion& motion);
   void hold_gnss(double foot_m, double sigma_m, const TrainMotion& motion);
 
   void doubt_points_behind(const TrainMotion& motion);

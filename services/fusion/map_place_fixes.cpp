@@ -77,8 +77,7 @@ void MapPlace::begin_with(const FixInput& fix, const FixContext& context, TrainM
   known_.track_doubt.said(fix.probability, std::nullopt, motion.filter().path_distance_m());
   accept(fix, context, motion);
   if (fix.of_before) doubt_points_behind(motion);
-  known_.told.tell(fix.kind == FixKind::gnss ? ToldBy::gnss : fix.only_told ? ToldBy::start : ToldBy::nobody);
-  known_.told_m = motion.distance_m();
+  tell(fix.kind == FixKind::gnss ? ToldBy::gnss : fix.only_told ? ToldBy::start : ToldBy::nobody, motion);
   if (fix.in_doubt) known_.wrong_place.doubt();
 }
 
@@ -148,13 +147,28 @@ Offer MapPlace::offer_again(const MeasuredPlace& place, MotionFilter& filter) co
   return offer;
 }
 
-// Some curve fits at a place that nobody has confirmed, though the train turns otherwise than the track there; and a
-// mast, where masts stand everywhere, at a start that nobody has.
+// Some curve fits at a place that nobody has confirmed, though the train turns otherwise than the track there; and some
+// landmark, where masts stand everywhere, at a start that nobody has.
 bool MapPlace::may_fit_by_chance(const FixInput& fix) const {
   const auto& told = known_.told;
-  if (fix.kind == FixKind::landmark) return told.waits_for_more();
+  if (fix.kind == FixKind::landmark) return told.may_be_elsewhere();
   if (fix.kind != FixKind::curvature) return false;
   return told.is_only_told() || told.by() == ToldBy::gnss || known_.track_doubt.turns_otherwise();
+}
+
+// It was sighted here, perhaps by chance, or was searched for and is here most likely.
+void MapPlace::speak_for_track(const FixInput& fix, bool by_chance, const TrainMotion& motion) {
+  if (!by_chance) {
+    const bool searched = fix.kind == FixKind::network || fix.kind == FixKind::gnss;
+    searched ? known_.track_doubt.found_here() : known_.track_doubt.seen_here();
+  } else if (fix.kind == FixKind::landmark) {
+    known_.track_doubt.may_be_here();
+    known_.wrong_place.may_be_here();
+  } else {
+    return;
+  }
+  known_.turned_way.corrected(fix_.offer.residual);
+  compare_turns(motion);
 }
 
 void MapPlace::accept(const FixInput& fix, const FixContext& context, TrainMotion& motion) {
@@ -162,25 +176,14 @@ void MapPlace::accept(const FixInput& fix, const FixContext& context, TrainMotio
   watch_of(fix).accept(fix.stamp_ns);
   off_path_.reset();
   const bool by_chance = may_fit_by_chance(fix);
-  const bool landmark = fix.kind == FixKind::landmark;
-  if (by_chance && landmark) {
-    known_.track_doubt.may_be_here();
-    known_.wrong_place.may_be_here();
-  } else if (!by_chance) {
-    const bool searched = fix.kind == FixKind::network || fix.kind == FixKind::gnss;
-    searched ? known_.track_doubt.found_here() : known_.track_doubt.seen_here();
-  }
-  if (!by_chance || landmark) {
-    known_.turned_way.corrected(fix_.offer.residual);
-    compare_turns(motion);
-  }
+  speak_for_track(fix, by_chance, motion);
   const bool bends_here = fix.kind == FixKind::curvature && std::abs(fix_.offer.residual) < kBendsHereM;
-  if (by_chance && bends_here) known_.wrong_place.bends_here();
+  if (by_chance && bends_here) known_.wrong_place.forget_turning();
   if (bends_here) known_.told.curve_agrees(fix.tells_track, known_.track_doubt.turns_otherwise());
   if (fix.kind == FixKind::network) known_.told.confirm();
   // A vague fix helps, but settles no doubt and is nothing to measure a distance from. Landmarks are sharp by
   // themselves.
-  if (!landmark && fix.sigma_m > 2 * filter.path_sigma_m()) return;
+  if (fix.kind != FixKind::landmark && fix.sigma_m > 2 * filter.path_sigma_m()) return;
   fix_.verdict = FixOutcome::Verdict::used;
   refused_.reset();
   if (!by_chance) known_.wrong_place.found();
@@ -241,11 +244,15 @@ void MapPlace::move_to(const FixInput& fix, double path_distance_m, const FixCon
   motion.filter().loosen_scale(*parameters_);
   motion.filter().offer_position({path_distance_m, fix_sigma_m(fix)}, parameters_->gate_fix);
   corrected_ = true;
+  // How it turned was held against the place before.
+  known_.track_doubt.changed();
+  known_.turned_way.clear();
+  known_.wrong_place.forget_turning();
+  known_.told.moved_to(fix);
   accept(fix, context, motion);
   // Either side: what told where to look for these two was wrong by as much. Until a third one agrees.
   claimed_ = {reach_m(fix.sigma_m), reach_m(fix.sigma_m)};
   fix_.verdict = FixOutcome::Verdict::corrected;
-  known_.told.moved_to(fix);
 }
 
 }  // namespace railfix::fusion

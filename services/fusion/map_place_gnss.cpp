@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kAgreementsOfGnss = 5;       // in a row: where it scatters one agrees by chance
 constexpr double kSharpGnssM = 2.0;        // one sigma of an RTK solution that knows a told start as a landmark does
-constexpr double kDirectionSigmas = 10.0;  // of way: on a place turned round GNSS is off by twice as much
+constexpr double kDirectionSigmas = 10.0;  // of way: where the cab looks the other way GNSS is off by twice as much
 constexpr double kDirectionM = 10.0;       // ... at least
 constexpr double kOffTrackM = 15.0;        // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
@@ -56,8 +56,8 @@ FootOnPath foot_on_path(const track::Path& path, double start_m, double easting_
 }  // namespace
 
 bool MapPlace::gnss_denies() const {
-  const bool never_agreed = !gnss_.agreed_on_way && !known_.told.believed();
-  return gnss_.watch.isolated && (never_agreed || known_.wrong_place.lost());
+  const bool never_agreed = gnss_.watch.used_ns == 0 || (gnss_.contradicts_direction && may_be_turned_round());
+  return gnss_.watch.isolated && ((never_agreed && !known_.told.believed()) || known_.wrong_place.lost());
 }
 
 double MapPlace::gnss_bound_m(const TrainMotion& motion) const {
@@ -67,6 +67,7 @@ double MapPlace::gnss_bound_m(const TrainMotion& motion) const {
 void MapPlace::exclude_gnss(const MapPlace& other, int64_t stamp_ns) {
   gnss_.watch = other.gnss_.watch;
   gnss_.watch.convict(stamp_ns);
+  known_.told.gnss_contradicts();
 }
 
 bool MapPlace::may_be_beyond(double end_m, const TrainMotion& motion) const {
@@ -95,6 +96,7 @@ void MapPlace::use(const GnssInput& sample, TrainMotion& motion) {
   const bool beside = beyond || std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
   const bool agrees = !beside && agrees_at(place.distance_m);
   const MeasuredPlace measured{foot_m, kGnssNewShare * once_m, StateIndex::gnss_error, kGnssLastingShare * once_m};
+  gnss_.contradicts_direction = !agrees && tells_direction(once_m, motion);
   if (gnss_.watch.isolated) {
     gnss_.watch.hear(agrees, kAgreementsOfGnss, sample.stamp_ns);
     hold_gnss(foot_m, once_m, motion);
@@ -102,7 +104,7 @@ void MapPlace::use(const GnssInput& sample, TrainMotion& motion) {
     gnss_.watch.accept(sample.stamp_ns);
     ++gnss_.agreed;
     if (tells_direction(once_m, motion)) {
-      gnss_.agreed_on_way = true;
+      known_.gnss_agreed = true;
       known_.told.gnss_agrees(sample.tells_track, is_rtk(sample) && once_m <= kSharpGnssM);
     }
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
@@ -116,14 +118,15 @@ void MapPlace::use(const GnssInput& sample, TrainMotion& motion) {
 }
 
 // Where the train was told it agrees with a cab that looks the other way just as well.
-bool MapPlace::tells_direction(double gnss_sigma_m, const TrainMotion& motion) const {
-  return std::abs(motion.distance_m() - known_.told_m) >= std::max(kDirectionM, kDirectionSigmas * gnss_sigma_m);
+bool MapPlace::tells_direction(double sigma_m, const TrainMotion& motion) const {
+  const double least_m = std::max(kDirectionM, kDirectionSigmas * std::hypot(sigma_m, known_.told_sigma_m));
+  return std::abs(motion.distance_m() - known_.told_m) >= least_m;
 }
 
 // A wheel that nobody sees may slide, proven GNSS may be wrong: who is, nobody knows. Of the last word of each. A
 // camera that comes back does not undo it.
 void MapPlace::hold_gnss(double foot_m, double sigma_m, const TrainMotion& motion) {
-  const bool began_unseen = !motion.sensors().see() || gnss_.held.behind_m + gnss_.held.ahead_m > 0;
+  const bool began_unseen = !motion.sensors().camera_sees() || gnss_.held.behind_m + gnss_.held.ahead_m > 0;
   if (!gnss_.watch.isolated) {
     gnss_.held = {};
   } else if (gnss_.was_proven && began_unseen) {

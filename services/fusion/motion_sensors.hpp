@@ -21,6 +21,7 @@ class MotionSensors {
   void move_to(int64_t now_ns) { now_ns_ = now_ns; }
   void set_clock(int64_t stamp_ns);
 
+  /// REQUIRES: one of kMotionSources.
   [[nodiscard]] SensorWatch& operator[](Source source) { return watches_[static_cast<size_t>(source)]; }
   [[nodiscard]] const SensorWatch& operator[](Source source) const { return watches_[static_cast<size_t>(source)]; }
 
@@ -29,7 +30,7 @@ class MotionSensors {
   /// It measured in the last moments and was believed.
   [[nodiscard]] bool measures(Source source) const;
   /// The camera is not blind, and believed.
-  [[nodiscard]] bool see() const { return measures(Source::camera); }
+  [[nodiscard]] bool camera_sees() const { return measures(Source::camera); }
   /// So many measured in the last moments and were believed.
   [[nodiscard]] int at_work() const;
   /// No odometer has measured in the last moments: the IMU alone is left, at best.

@@ -14,7 +14,9 @@ void ToldPlace::agrees(const FixInput& landmark) {
 
 // Once so many in a row have agreed they are believed, whatever one says later.
 void ToldPlace::disagrees(const FixInput& fix) {
-  if (fix.kind == FixKind::landmark && !believed()) landmarks_agreed_ = 0;
+  if (fix.kind != FixKind::landmark) return;
+  along_known_ = false;
+  if (!believed()) landmarks_agreed_ = 0;
 }
 
 void ToldPlace::moved_to(const FixInput& fix) {
@@ -29,12 +31,12 @@ bool ToldPlace::confirms_start(bool tells_track) {
   return tells_track;
 }
 
-// Where masts stand everywhere some stand by chance where the map has them: map_matcher knows how many; GNSS is never
-// so far off.
+// Any number of masts fits where others stand as far apart: map_matcher says when no other place near would have given
+// the same. GNSS is never so far off.
 void ToldPlace::confirm_by(const FixInput& landmark) {
+  along_known_ = along_known_ || landmark.sightings_fit == SightingsFit::here;
   if (is_only_told() && !confirms_start(landmark.tells_track)) return;
-  const bool confirms = landmark.sightings_fit == SightingsFit::here || believed();
-  if (!is_only_told() || confirms) confirm();
+  if (!is_only_told() || along_known_) confirm();
 }
 
 // One may fit by chance, and there is none on a straight line that lies elsewhere.

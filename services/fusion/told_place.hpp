@@ -17,6 +17,7 @@ class ToldPlace {
   void tell(ToldBy by) {
     by_ = by;
     bends_agreed_ = 0;
+    along_known_ = false;
   }
   void confirm() { by_ = ToldBy::nobody; }
   /// A landmark agrees with it ...
@@ -27,7 +28,7 @@ class ToldPlace {
   void moved_to(const FixInput& fix);
   /// The track bends here as it should.
   void curve_agrees(bool tells_track, bool turns_otherwise);
-  /// GNSS has agreed with it over some way: which way the train runs is known as well.
+  /// GNSS has agreed with it, and with where the cab looks.
   void gnss_agrees(bool tells_track, bool is_sharp);
   /// GNSS is isolated: what it had said for the place counts no more.
   void gnss_contradicts() {
@@ -37,8 +38,8 @@ class ToldPlace {
   [[nodiscard]] ToldBy by() const { return by_; }
   /// Nothing has confirmed yet the start that somebody has told.
   [[nodiscard]] bool is_only_told() const { return by_ == ToldBy::start; }
-  /// ... or nobody but GNSS, which knows it to some 10 m.
-  [[nodiscard]] bool waits_for_more() const { return by_ == ToldBy::start || by_ == ToldBy::start_and_gnss; }
+  /// ... not even how far along the track it is, or where the cab looks: landmarks that fit may do so by chance.
+  [[nodiscard]] bool may_be_elsewhere() const { return is_only_told() && !along_known_; }
   /// What has agreed with it agrees with a track beside it as well.
   [[nodiscard]] bool alike_beside() const { return alike_beside_; }
   /// So many landmarks say that it is here, the first kLandmarksBelieved of them in a row.
@@ -55,6 +56,7 @@ class ToldPlace {
   ToldBy by_ = ToldBy::nobody;
   int bends_agreed_ = 0;  // curves that fitted a place that was only told
   bool alike_beside_ = false;
+  bool along_known_ = false;  // by landmarks that may stand beside another track as well
   int landmarks_agreed_ = 0;
 };
 

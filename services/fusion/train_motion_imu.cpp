@@ -75,10 +75,10 @@ void TrainMotion::use_acceleration(double accel_mps2, int64_t stamp_ns, const tr
 // train without a camera that is always so: the first slip would leave room that grows without end.
 void TrainMotion::feel(double accel_mps2, double sigma_mps2, int64_t before_ns) {
   const double dt_s = core::seconds(filter_.stamp_ns() - before_ns);
-  const bool blind = sensors_[Source::camera].seen_ns != 0 && !sensors_.see();
+  const bool blind = sensors_[Source::camera].seen_ns != 0 && !sensors_.camera_sees();
   // What was felt goes on when the wheel begins to turn and is found out.
   const bool told = sensors_.measures(Source::wheel) || (sensors_[Source::wheel].isolated && feels_otherwise());
-  const bool alone = sensors_.see() ? !sensors_.measures(Source::wheel) : blind && told;
+  const bool alone = sensors_.camera_sees() ? !sensors_.measures(Source::wheel) : blind && told;
   const bool goes_on = feels_otherwise() && sensors_.in_the_dark();  // it may come back as wrong as it went
   if ((!alone && !goes_on) || dt_s > MotionSensors::kLatelyS) {
     felt_ = {};

@@ -36,7 +36,7 @@ void TrainMotion::isolate_wheel() {
   slip_watch_.no_picture();
   // On trial it was wrong all the time, not since a second ago, and the speed at which the camera came back was its
   // own.
-  const bool failed_trial = wheel_.on_trial && sensors_.see();
+  const bool failed_trial = wheel_.on_trial && sensors_.camera_sees();
   if (failed_trial) filter_.loosen_speed(kMisledSpeedMps);
   slip_began_ = !failed_trial;
   wheel_.on_trial = false;
@@ -96,12 +96,12 @@ void TrainMotion::watch_alone(double way_m, double dt_s) {
                     .isolated = sensors_[Source::wheel].isolated,
                     .watched = is_watched(),
                     .alone = wheel_is_alone(),
-                    .came_back = slipped_unseen() && !sensors_.see()},
+                    .came_back = slipped_unseen() && !sensors_.camera_sees()},
                    *parameters_);
 }
 
 bool TrainMotion::wheel_is_alone() const {
-  return !sensors_.see() && !sensors_.used_lately(Source::imu);
+  return !sensors_.camera_sees() && !sensors_.used_lately(Source::imu);
 }
 
 // A camera sees every slip; what it has taught an IMU is good for some time, unless that was taken back just before. A
@@ -109,7 +109,7 @@ bool TrainMotion::wheel_is_alone() const {
 bool TrainMotion::is_watched() const {
   const int64_t camera_ns = sensors_[Source::camera].used_ns;
   const bool taught = core::seconds(camera_ns - sensors_[Source::imu].changed_ns) > kTeachesS;
-  return sensors_.used_within(Source::camera, kTaughtS) && (sensors_.see() || taught) &&
+  return sensors_.used_within(Source::camera, kTaughtS) && (sensors_.camera_sees() || taught) &&
          !(slipped_unseen() && wheel_is_alone());
 }
 
@@ -147,7 +147,7 @@ void TrainMotion::take_wheel_back(int64_t stamp_ns, const WheelReading& reading)
 // While the wheel slips its odometer is only compared, window by window; two good windows in which it turned end the
 // slip: a wheel that is stuck agrees with every train that stands. Where there is no camera it must be taken as it is.
 void TrainMotion::recover_wheel(int64_t stamp_ns, const WheelReading& reading) {
-  if (sensors_.see()) {
+  if (sensors_.camera_sees()) {
     if (wheel_.camera_agrees) take_wheel_back(stamp_ns, reading);
     return;
   }
@@ -172,7 +172,7 @@ void TrainMotion::recover_wheel(int64_t stamp_ns, const WheelReading& reading) {
   begin_window();
   if (wheel_.good_windows < kGoodWindows && !(alone && turns)) return;
   sensors_[Source::wheel].accept(stamp_ns);
-  wheel_.on_trial = !sensors_.see();
+  wheel_.on_trial = !sensors_.camera_sees();
   // It tells how fast the train is from now on, not how far the IMU was out before.
   if (wheel_.on_trial) filter_.loosen_speed(filter_.sigma(StateIndex::speed));
 }

@@ -37,8 +37,9 @@ class WrongPlace {
     fits_nowhere_ = lost_ = of_before_ = false;
     lost_m_ = 0;
   }
-  /// The track bends where the train does, by the camera: it may be the gyro that is wrong.
-  void bends_here() { turning_m_ = 0; }
+  /// The track bends where the train does, by the camera, and it may be the gyro that is wrong; or the place is another
+  /// one now.
+  void forget_turning() { turning_m_ = 0; }
   /// The train has run so far.
   void move(double way_m, SpeaksAgainst now);
 

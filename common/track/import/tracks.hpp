@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "track/aside.hpp"
 #include "track/map.hpp"
 
 namespace railfix::track {
@@ -24,10 +25,6 @@ constexpr bool is_speed(double kmh) {
 }
 constexpr const char* kNoTrackHas = "which no track has";
 constexpr const char* kNoTrainRuns = "which no train runs";
-
-/// From the track's middle to a signal's mast where the source says its side alone: usual are 3.1 m to its near side
-/// along main lines, 2.2 m in stations and between two tracks. Who compares pictures with the map looks at the side.
-constexpr double kMastBesideM = 3.0;
 
 /// A landmark on one track, not yet numbered.
 struct TrackMark {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "track/aside.hpp"
+
 namespace railfix::map_matcher {
 namespace {
 
@@ -52,7 +54,9 @@ double sighting_fits(const track::Map& map, const track::Route& route, const Sig
     const double lateral_m = leg.run.forward ? landmark.lateral_m : -landmark.lateral_m;
     double side = 1;
     if (sided && std::abs(lateral_m) > kSideM) {
-      side = (lateral_m > 0) == (sighting.lateral_m > 0) ? 1 - parameters.wrong_side : parameters.wrong_side;
+      const bool fits = (lateral_m > 0) == (sighting.lateral_m > 0) &&
+                        track::fits_aside(sighting.lateral_m, lateral_m, track::is_aside_measured(landmark));
+      side = fits ? 1 - parameters.wrong_side : parameters.wrong_side;
     }
     density += parameters.detection * sighting.confidence * side * std::exp(-0.5 * z * z) /
                (sigma_m * std::sqrt(2 * std::numbers::pi));

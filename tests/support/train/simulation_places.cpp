@@ -17,6 +17,11 @@ constexpr double kSightedAheadM = 6;
 constexpr double kMissed = 0.15;
 constexpr double kFalsePerM = 0.0005;  // of each kind
 constexpr double kSightingSigmaM = 0.15;
+constexpr uint32_t kSure = 5;  // so many landmarks tell map_matcher that the train is nowhere else
+
+fusion::SightingsFit fit_of(uint32_t landmarks) {
+  return landmarks < kSure ? fusion::SightingsFit::not_told : fusion::SightingsFit::here;
+}
 
 }  // namespace
 
@@ -70,7 +75,8 @@ void TrainSimulation::make_fixes() {
     if (!misled_landmarks_ || !faulty(Sensor::fix, FaultKind::wrong_branch, t)) {
       add(Sensor::fix, t,
           FixInput{stamp_ns(t), place.edge, place.offset_m, plan_.fix_sigma_m,
-                   sure ? kSureProbability : plan_.fix_probability, id, FixKind::landmark, place.direction, nullptr});
+                   sure ? kSureProbability : plan_.fix_probability, id, FixKind::landmark, place.direction, nullptr,
+                   fit_of(id)});
     }
     place_m += plan_.landmark_spacing_m * (1 + plan_.landmark_spread * random.uniform(-1, 1));
   }
@@ -78,6 +84,7 @@ void TrainSimulation::make_fixes() {
 
 void TrainSimulation::make_fixes_of_map() {
   auto random = stream(seed_, 14);
+  uint32_t landmarks = 0;
   for (const auto& mark : path_->landmarks()) {
     const auto wanted =
         std::ranges::find(plan_.map_landmarks, mark.kind, &std::pair<track::LandmarkKind, double>::first);
@@ -87,7 +94,7 @@ void TrainSimulation::make_fixes_of_map() {
     const auto place = path_->position_at(drive_.at(t).distance_m + wanted->second * noise);
     add(Sensor::fix, t,
         FixInput{stamp_ns(t), place.edge, place.offset_m, wanted->second, plan_.fix_probability, mark.landmark->id,
-                 FixKind::landmark, place.direction, nullptr});
+                 FixKind::landmark, place.direction, nullptr, fit_of(++landmarks)});
   }
 }
 

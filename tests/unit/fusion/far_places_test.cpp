@@ -37,7 +37,7 @@ TrainEstimate run_far(double to_m, const track::EdgePosition& start) {
     place_m += ahead * kStepM;
     if (auto state = fusion.add(OdometryInput{at(t_s), at(t_s - 1), along * ahead * kStepM, 0.01, true})) last = state;
     if (std::fmod(place_m, 10000) != 5000) continue;
-    auto fix = fix_at(t_s + 0.001, 5000, ++landmark);
+    auto fix = sure_fix_at(t_s + 0.001, 5000, ++landmark);
     fix.edge = static_cast<uint32_t>(place_m / 10000) + 1;
     fix.direction = start.direction;
     fusion.add(fix);
@@ -121,9 +121,7 @@ TEST(FarPlaces, OnARingALandmarkIsThatOfThisRound) {
   auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 0, track::Direction::forward}));
   for (int i = 1; i <= 12; ++i) {  // half a round each, with a landmark at 1000 m and one at 0
     run(fusion, 50 * (i - 1), 50 * i - 10, 20);
-    auto fix = fix_at(50 * i - 10, i % 2 == 0 ? 1800 : 800, static_cast<uint32_t>(1 + i % 2));
-    fix.sightings_fit = SightingsFit::here;
-    fusion.add(fix);
+    fusion.add(sure_fix_at(50 * i - 10, i % 2 == 0 ? 1800 : 800, static_cast<uint32_t>(1 + i % 2)));
     const auto state = run(fusion, 50 * i - 10, 50 * i, 20);
     EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
     EXPECT_EQ(state.reference, static_cast<uint32_t>(1 + i % 2));

@@ -134,7 +134,7 @@ TEST(LostPlace, IsOverWithLandmarksOnlyHoweverLittleIsDoubtedAnyMore) {
   EXPECT_NE(state.reason.find("waits for a landmark"), std::string::npos) << state.reason;
   EXPECT_GE(std::min(state.over_m, state.under_m), 100);
   for (uint32_t landmark = 1; landmark <= 5; ++landmark, t_s += 3) {
-    fusion.add(fix_at(t_s, 900 + 20 * t_s, landmark));
+    fusion.add(sure_fix_at(t_s, 900 + 20 * t_s, landmark));
     state = run(fusion, t_s, t_s + 3, 20);
   }
   EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;

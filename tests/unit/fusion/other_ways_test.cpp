@@ -14,7 +14,9 @@ FixInput track_fix(double t_s, uint32_t edge, double offset_m) {
   return {at(t_s), edge, offset_m, INFINITY, 1.0, 0, FixKind::track, track::Direction::forward, nullptr};
 }
 FixInput landmark_fix(double t_s, uint32_t edge, double offset_m, uint32_t landmark) {
-  return {at(t_s), edge, offset_m, 0.1, 0.9999, landmark, FixKind::landmark, track::Direction::forward, nullptr};
+  return {
+      at(t_s),           edge, offset_m, 0.1, 0.9999, landmark, FixKind::landmark, track::Direction::forward, nullptr,
+      SightingsFit::here};
 }
 
 /// A stem of 1000 m, a straight leg of 400 m, a siding that is longer, and on from where they meet.

@@ -107,7 +107,7 @@ TEST(References, TwoLandmarksCalibrateTheCamerasScale) {
   for (int k = 1; k <= 5; ++k) {
     run(fusion, (k - 1) * 20.0, k * 20.0, 20);  // the camera says 400 m, truly it is 1 % more
     place_m = k * 404.0;
-    fusion.add(fix_at(k * 20.0, place_m, static_cast<uint32_t>(k)));
+    fusion.add(sure_fix_at(k * 20.0, place_m, static_cast<uint32_t>(k)));
   }
   const auto state = run(fusion, 100, 120, 20);
   EXPECT_NEAR(state.visual_scale, 1.01, 0.001);

@@ -46,6 +46,12 @@ inline OdometryInput step_at(double t_s, double speed_mps, double period_s = 0.0
 inline FixInput fix_at(double t_s, double offset_m, uint32_t landmark, double probability = 0.9999) {
   return {at(t_s), 1, offset_m, 0.1, probability, landmark, FixKind::landmark, track::Direction::forward, nullptr};
 }
+/// With which map_matcher knows that the train is nowhere else.
+inline FixInput sure_fix_at(double t_s, double offset_m, uint32_t landmark) {
+  auto fix = fix_at(t_s, offset_m, landmark);
+  fix.sightings_fit = SightingsFit::here;
+  return fix;
+}
 inline WheelInput wheel_at(double t_s, double metres) {
   return {at(t_s), static_cast<int64_t>(std::floor(metres * 100)), 100};
 }

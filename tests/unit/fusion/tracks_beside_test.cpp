@@ -3,6 +3,7 @@
 
 #include "core/units.hpp"
 #include "straight_run.hpp"
+#include "track/aside.hpp"
 #include "track/tracks_beside.hpp"
 
 namespace railfix::fusion {
@@ -29,8 +30,8 @@ std::shared_ptr<const track::Map> double_track(bool against) {
 }
 
 FixInput fix_of(const track::Landmark& landmark, double t_s) {
-  return {at(t_s),     landmark.edge,     landmark.offset_m,         0.1,    0.9999,
-          landmark.id, FixKind::landmark, track::Direction::forward, nullptr};
+  return {at(t_s),     landmark.edge,     landmark.offset_m,         0.1,     0.9999,
+          landmark.id, FixKind::landmark, track::Direction::forward, nullptr, SightingsFit::here};
 }
 
 constexpr const char* kAlikeBeside =
@@ -56,6 +57,32 @@ TEST(TracksBeside, WhatStandsBesideBothConfirmsNoStartThatWasTold) {
     state = run(fusion, 72.5, 73, 20);
     EXPECT_EQ(state.integrity, Integrity::ok) << state.reason;
   }
+}
+
+// How far along the track it is, is known: the gyro is no more believed than beside landmarks that confirm the start.
+TEST(TracksBeside, AStartThatBothWouldHaveHadIsKeptOverSomeBumps) {
+  const auto map = double_track(false);
+  auto fusion = core::value_or_throw(Fusion::create({}, map, track::EdgePosition{1, 50, track::Direction::forward}));
+  TrainEstimate state;
+  double t_s = 0;
+  const auto ride_to = [&](double there_s) {
+    for (; t_s < there_s; t_s += 0.5) {
+      const bool bump = std::fmod(t_s, 60) > 55;
+      for (int i = 0; i < 25; ++i) {
+        const double turn_rps = (bump ? 0.02 : 0) + (i % 2 == 0 ? 1e-4 : -1e-4);
+        fusion.add(ImuInput{at(t_s + 0.02 * i + 0.01), 0.01 * (i % 3), turn_rps});
+      }
+      state = run(fusion, t_s, t_s + 0.5, 20);
+    }
+  };
+  for (const auto& landmark : map->landmarks) {
+    if (landmark.edge != 1 || landmark.kind != track::LandmarkKind::mast) continue;
+    ride_to((landmark.offset_m - 50) / 20);
+    fusion.add(fix_of(landmark, t_s));
+  }
+  EXPECT_TRUE(state.track_known);
+  EXPECT_EQ(state.integrity, Integrity::degraded) << state.reason;
+  EXPECT_EQ(state.reason, kAlikeBeside);
 }
 
 TEST(TracksBeside, GnssSaysNothingOfAStartBesideAnotherTrack) {
@@ -91,10 +118,46 @@ TEST(TracksBeside, AMastWithoutASideMayBeTheSameOne) {
   auto map = std::make_shared<track::Map>();
   map->edges = {{1, "a", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})},
                 {2, "b", 3, 4, "", track::Alignment::chained({4, 0, 0}, {{1000, 0, 0}})}};
-  for (const auto& [other_m, is_alike] : {std::pair(3.0, true), {0.0, true}, {-3.0, false}}) {
-    map->landmarks = {{1, track::LandmarkKind::mast, 1, 500, 3, 3, ""},
-                      {2, track::LandmarkKind::mast, 2, 500, other_m, 3, ""}};
+  for (const auto& [other_m, is_alike] : {std::pair(3.1, true), {0.0, true}, {-3.1, false}}) {
+    map->landmarks = {{1, track::LandmarkKind::mast, 1, 500, 3.1, 0.1, ""},
+                      {2, track::LandmarkKind::mast, 2, 500, other_m, 0.1, ""}};
     EXPECT_EQ(track::TracksBeside(map).has_alike(map->landmarks[0]), is_alike) << other_m;
+  }
+}
+
+// Of a double track with masts outside: 3 m from its own track, 7 m from the other one, which sees it as well.
+TEST(TracksBeside, AMastBeyondItsTrackIsTheSameOneFromTheOtherWhereNobodyMeasuredHowFarAsideItStands) {
+  auto map = std::make_shared<track::Map>();
+  map->edges = {{1, "a", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})},
+                {2, "b", 3, 4, "", track::Alignment::chained({4, 0, 0}, {{1000, 0, 0}})},
+                {3, "c", 5, 6, "", track::Alignment::chained({-8, 1000, core::kPi}, {{1000, 0, 0}})}};
+  const auto is_alike = [&](double lateral_m, double sigma_m = 0.1) {
+    map->landmarks = {{1, track::LandmarkKind::mast, 1, 500, lateral_m, sigma_m, ""}};
+    return track::TracksBeside(map).has_alike(map->landmarks[0]);
+  };
+  EXPECT_TRUE(is_alike(track::kMastBesideM));
+  EXPECT_TRUE(is_alike(3.1, 3)) << "drawn to metres";
+  EXPECT_FALSE(is_alike(3.1)) << "7.1 m aside nobody takes it for one at 3.1 m";
+  EXPECT_FALSE(is_alike(-2)) << "between both";
+  EXPECT_TRUE(is_alike(0));
+}
+
+// Two of 5 m each on the other track, drawn the other way, of which one lies on its next edge.
+TEST(TracksBeside, WhatTheMapHasWrongMayBeTheSameOneOnTheOtherTracksNextEdgeAsWell) {
+  auto map = std::make_shared<track::Map>();
+  const auto beside = [](double from_m, double to_m) {
+    return track::Alignment::chained({4, from_m, core::kPi}, {{from_m - to_m, 0, 0}});
+  };
+  map->edges = {{1, "a", 1, 2, "", track::Alignment::chained({0, 0, 0}, {{1000, 0, 0}})},
+                {2, "b", 3, 4, "", beside(1000, 500)},
+                {3, "b2", 4, 5, "", beside(500, 0)}};
+  map->connections = {{4, 2, 3, false}};
+  for (const auto& [edge, offset_m] : {std::pair(2U, 494.0), {3U, 6.0}}) {
+    for (const double sigma_m : {0.1, 3.0}) {
+      map->landmarks = {{1, track::LandmarkKind::portal_in, 1, 500, 0, sigma_m, ""},
+                        {2, track::LandmarkKind::portal_out, edge, offset_m, 0, sigma_m, ""}};
+      EXPECT_EQ(track::TracksBeside(map).has_alike(map->landmarks[0]), sigma_m > 1) << edge << " " << sigma_m;
+    }
   }
 }
 

@@ -187,17 +187,16 @@ TEST_F(WrongStart, IsNeverOkAsLongAsNothingHasConfirmedIt) {
   for (int i = 0; i < 20; ++i) EXPECT_EQ(go(100, [] {}).reason, kOnlyTold);
 }
 
-TEST_F(WrongStart, ThatIsRightIsOkFromTheLandmarkOnByWhichTheMatcherIsSureOrTheFifth) {
-  for (const uint32_t sure_at : {2, 9}) {
+// Masts at even distances agree wherever the train is, however many of them.
+TEST_F(WrongStart, ThatIsRightIsOkFromTheLandmarkOnByWhichTheMatcherIsSure) {
+  for (const uint32_t sure_at : {2, 20}) {
     fusion_ = fusion_at(900);
     t_s_ = 0;
-    for (uint32_t landmark = 1; landmark < std::min(sure_at, 5U); ++landmark) {
+    for (uint32_t landmark = 1; landmark < sure_at; ++landmark) {
       fusion_.add(fix_at(t_s_, told_m(), landmark));
       EXPECT_EQ(go(40, [] {}).reason, kOnlyTold) << landmark;
     }
-    auto last = fix_at(t_s_, told_m(), 5);
-    if (sure_at < 5) last.sightings_fit = SightingsFit::here;
-    fusion_.add(last);
+    fusion_.add(sure_fix_at(t_s_, told_m(), sure_at));
     EXPECT_EQ(go(40, [] {}).reason, "");
   }
 }
@@ -236,15 +235,40 @@ TEST_F(WrongStart, ThatGnssAgreedWithAtRestOnlyIsNoPositionWhenItContradictsUnde
 
 TEST_F(WrongStart, IsToldByTurningAlsoWhereMastsStandByChance) {
   go_straight();
-  int second = 0;
+  uint32_t second = 0;
   const auto masts = [&] {
     turn(++second % 20 < 10 ? 0.001 : -0.001);
-    if (second % 3 == 0) fusion_.add(fix_at(t_s_, told_m(), 1 + static_cast<uint32_t>(second) % 4));
-    if (second % 9 == 1) fusion_.add(fix_at(t_s_, told_m() + 30, 7));  // never five in a row
+    if (second % 3 == 0) fusion_.add(fix_at(t_s_, told_m(), second));
   };
   const auto state = go(600, masts);
   EXPECT_THAT(state.reason, HasSubstr("turns otherwise than this track"));
   EXPECT_EQ(state.integrity, Integrity::unusable) << state.reason;
+}
+
+TEST_F(WrongStart, IsNotDeniedByGnssThatWandersAtRest) {
+  const auto stand = [&](double off_m) {
+    fusion_.add(GnssInput{at(t_s_), 0, 900 + off_m, 1, 1});
+    return run(fusion_, t_s_, t_s_ + 1, 0);
+  };
+  for (; t_s_ < 10; t_s_ += 1) stand(0);
+  TrainEstimate state;
+  for (; t_s_ < 20; t_s_ += 1) state = stand(60);
+  EXPECT_THAT(state.reason, HasSubstr("GNSS contradicts"));
+  EXPECT_EQ(state.integrity, Integrity::degraded) << state.reason;
+}
+
+TEST_F(WrongStart, ThatTwoFixesHaveMovedIsNotJudgedByHowItTurnedAtThePlaceBefore) {
+  go_straight();
+  int second = 0;
+  const auto bends = [&] { turn(++second % 20 < 10 ? 0.001 : -0.001); };
+  EXPECT_EQ(go(400, bends).integrity, Integrity::unusable);
+  for (const uint32_t landmark : {1, 2}) {
+    fusion_.add(fix_at(t_s_, told_m() + 60, landmark));
+    go(40, [&] { turn(0); });
+  }
+  const auto state = go(600, [&] { turn(0); });
+  EXPECT_THAT(state.reason, Not(HasSubstr("turns otherwise")));
+  EXPECT_EQ(state.integrity, Integrity::degraded) << state.reason;
 }
 
 TEST_F(WrongStart, ThatGnssAgreesWithIsOkFromTheThirdCurveOn) {

@@ -7,6 +7,7 @@
 
 #include "core/random.hpp"
 #include "core/result.hpp"
+#include "track/aside.hpp"
 #include "unit/map_matcher/marked_line.hpp"
 
 namespace railfix::map_matcher {
@@ -175,6 +176,64 @@ TEST(LandmarkMatcher, APlaceThatWasConfirmedIsDoubtedWhereTheMapGoesOnOtherwise)
   }
 }
 
+// From each of two tracks 4.2 m apart a train sees the masts of both.
+TEST(LandmarkMatcher, AMastBeyondTheTrackBesideIsNotTheOneOfTheOwnTrack) {
+  const auto is_fix = [](double seen_m, double mapped_m, double map_sigma_m = 0.1) {
+    auto map = marked_line({{LandmarkKind::mast, 500}});
+    auto changed = std::make_shared<track::Map>(*map);
+    changed->landmarks[0].lateral_m = mapped_m;
+    changed->landmarks[0].sigma_m = map_sigma_m;
+    LandmarkMatcher matcher({}, path_along(changed));
+    Sighting sighting = sighting_of(LandmarkKind::mast);
+    sighting.lateral_m = seen_m;
+    return matcher.add(sighting, prior_at(495, 5, 495)).has_value();
+  };
+  EXPECT_TRUE(is_fix(3.4, 3.1));
+  EXPECT_FALSE(is_fix(7.3, 3.1));
+  EXPECT_FALSE(is_fix(-3.1, 3.1));
+  EXPECT_TRUE(is_fix(5, track::kMastBesideM)) << "the source said the side alone";
+  EXPECT_FALSE(is_fix(7.2, track::kMastBesideM));
+  EXPECT_TRUE(is_fix(5, 3.1, 3)) << "drawn to metres";
+  EXPECT_FALSE(is_fix(7.2, 3.1, 3));
+  EXPECT_TRUE(is_fix(7.3, 0)) << "not known";
+}
+
+/// Runs past masts every 60 m, and what else the map has, where somebody told the start `told_off_m` further on; how
+/// often it was confirmed, and how often a fix was sure.
+struct Passed {
+  int here = 0;
+  int sure = 0;
+};
+Passed pass_even_masts(double told_off_m, const std::vector<std::pair<LandmarkKind, double>>& else_mapped) {
+  auto mapped = else_mapped;
+  for (double m = 60; m < 9000; m += 60) mapped.emplace_back(LandmarkKind::mast, m);
+  std::ranges::sort(mapped, {}, &std::pair<LandmarkKind, double>::second);
+  LandmarkMatcher matcher({}, line_with(mapped));
+  Passed passed;
+  for (const auto& [kind, m] : mapped) {
+    if (m < 3000 || m > 5000) continue;
+    const auto fix = matcher.add(sighting_of(kind, 0.95), prior_at(m - 5 + told_off_m, 5, m - 5));
+    passed.sure += fix && fix->probability > 0.9 ? 1 : 0;
+    passed.here += fix && fix->sightings_fit == SightingsFit::here ? 1 : 0;
+  }
+  return passed;
+}
+
+TEST(LandmarkMatcher, MastsAtEvenDistancesConfirmNoPlace) {
+  for (const double told_off_m : {0.0, 120.0, -60.0}) {
+    const auto passed = pass_even_masts(told_off_m, {});
+    EXPECT_EQ(passed.here, 0) << told_off_m;
+    EXPECT_GT(passed.sure, 25) << "they fit";
+  }
+}
+
+TEST(LandmarkMatcher, WhatStandsAmongEvenMastsConfirmsThePlaceForGood) {
+  EXPECT_GT(pass_even_masts(0, {{LandmarkKind::balise, 4010}}).here, 14);
+  EXPECT_GT(pass_even_masts(0, {{LandmarkKind::frog, 4010}}).here, 14);
+  EXPECT_GT(pass_even_masts(0, {{LandmarkKind::bridge, 4010}}).here, 14);
+  EXPECT_EQ(pass_even_masts(120, {{LandmarkKind::balise, 4010}}).here, 0);
+}
+
 TEST(LandmarkMatcher, UnsureSightingGivesUnsureFix) {
   LandmarkMatcher matcher({}, line_with({{LandmarkKind::frog, 500}}));
   const auto fix = matcher.add(sighting_of(LandmarkKind::frog, 0.6), prior_at(495, 10, 0));
@@ -239,11 +298,13 @@ class MastLine {
       ++seen_;
       const auto fix = matcher_->add(sighting_of(LandmarkKind::mast, 0.95), prior_at(m - 5 + told_off_m, 5, m - 5));
       sure_ += fix && fix->probability >= 0.9 ? 1 : 0;
+      here_ += fix && fix->sightings_fit == SightingsFit::here ? 1 : 0;
       doubted_ += matcher_->doubt() > 0.5 ? 1 : 0;
     }
   }
   [[nodiscard]] double sure_share() const { return static_cast<double>(sure_) / seen_; }
   [[nodiscard]] int sure() const { return sure_; }
+  [[nodiscard]] double here_share() const { return static_cast<double>(here_) / seen_; }
   [[nodiscard]] double doubted_share() const { return static_cast<double>(doubted_) / seen_; }
   [[nodiscard]] int doubted() const { return doubted_; }
   [[nodiscard]] double doubt() const { return matcher_->doubt(); }
@@ -254,6 +315,7 @@ class MastLine {
   std::optional<LandmarkMatcher> matcher_;
   int seen_ = 0;
   int sure_ = 0;
+  int here_ = 0;
   int doubted_ = 0;
 };
 
@@ -276,6 +338,7 @@ TEST(LandmarkMatcher, MastsConfirmThePlaceWhereTheTrainIs) {
     EXPECT_EQ(line.doubted(), 0) << seed;
     EXPECT_EQ(line.doubt(), 0) << seed;
     EXPECT_GT(line.sure_share(), 0.9) << seed;
+    EXPECT_GT(line.here_share(), 0.75) << seed << ": no other place is alike";
   }
 }
 

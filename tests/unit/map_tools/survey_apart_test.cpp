@@ -119,6 +119,12 @@ TEST(SurveyApart, ASideThatTheMapDoesNotKnowIsLearnt) {
   passes.map.landmarks[5].lateral_m = 0;
   EXPECT_NEAR(passes.learnt(6).landmark.lateral_m, -3, 1e-9);
   EXPECT_EQ(passes.learnt(1).landmark.lateral_m, 0) << "a frog has none";
+  auto& mast = passes.map.landmarks[5];
+  mast.lateral_m = -4.9;
+  mast.sigma_m = 3;
+  EXPECT_NEAR(passes.learnt(6).landmark.lateral_m, -3, 1e-9) << "it was drawn";
+  mast.lateral_m = 0;
+  mast.sigma_m = 0.1;
   for (auto& seen : passes.sightings) seen.lateral_m = 0;
   EXPECT_EQ(passes.learnt(6).landmark.lateral_m, 0);
 }

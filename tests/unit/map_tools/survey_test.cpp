@@ -62,6 +62,31 @@ TEST(Survey, FindsWhatSeveralRunsSawWithHonestSigmas) {
   EXPECT_NEAR(std::sqrt(squares / count), 1.0, 0.25);
 }
 
+// A double track: the other track's masts are seen on the side where the own ones of a third one would be.
+TEST(Survey, AMastFurtherAsideIsAnotherOne) {
+  Passes passes(3, 0.5, 1);
+  const auto own = passes.sightings;
+  for (auto seen : own) {
+    if (seen.kind != LandmarkKind::mast) continue;
+    seen.offset_m += 1;
+    seen.way_m += 1;
+    seen.lateral_m = -7.2;
+    passes.sightings.push_back(seen);
+  }
+  uint32_t id = 1;
+  for (const double m : passes.masts) passes.map.landmarks.push_back({++id, LandmarkKind::mast, 1, m, -3.1, 0.1, ""});
+  int known = 0;
+  int further = 0;
+  for (const auto& found : survey_landmarks(passes.map, passes.sightings, {}).landmarks) {
+    if (found.landmark.kind != LandmarkKind::mast) continue;
+    EXPECT_EQ(found.sightings, 3U);
+    known += found.known_id != 0 ? 1 : 0;
+    further += found.known_id == 0 && std::abs(found.landmark.lateral_m + 7.2) < 0.1 ? 1 : 0;
+  }
+  EXPECT_EQ(known, 4);
+  EXPECT_EQ(further, 4);
+}
+
 /// Runs whose places the same vague masts of the map have told, by a filter that is honest: all runs err alike.
 struct RunsOnAVagueMap {
   static constexpr double kApartM = 400;

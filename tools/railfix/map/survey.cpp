@@ -16,16 +16,27 @@ namespace {
 constexpr int kRounds = 3;
 constexpr double kLocaccSigmas = 4;
 
+/// What is further aside is another one: of those that came last more than one may be near.
+std::vector<size_t>* near_thing(std::vector<Thing>& things, const std::vector<SurveySighting>& all,
+                                const std::vector<double>& places, size_t sighting, double gate_m) {
+  constexpr size_t kAbreast = 4;
+  for (size_t back = 1; back <= std::min(kAbreast, things.size()); ++back) {
+    auto& sightings = things[things.size() - back].sightings;
+    const SurveySighting& last = all[sightings.back()];
+    const bool near = places[sighting] - places[sightings.back()] < gate_m;
+    if (near && alike(all[sighting], last.kind, last.edge, last.lateral_m)) return &sightings;
+  }
+  return nullptr;
+}
+
 /// Sightings sorted by kind, side and place fall into things. Where a run tells one thing apart from the last one,
 /// those of other runs that lie nearer to the new one go with it.
 std::vector<Thing> new_things(const std::vector<SurveySighting>& all, const std::vector<double>& places,
                               const std::vector<size_t>& sorted, double gate_m) {
   std::vector<Thing> things;
   for (const size_t i : sorted) {
-    auto* last = things.empty() ? nullptr : &things.back().sightings;
-    const bool near = last != nullptr &&
-                      alike(all[i], all[last->back()].kind, all[last->back()].edge, all[last->back()].lateral_m) &&
-                      places[i] - places[last->back()] < gate_m;
+    auto* last = near_thing(things, all, places, i, gate_m);
+    const bool near = last != nullptr;
     const bool apart = near && std::ranges::any_of(*last, [&](size_t other) { return told_apart(all[i], all[other]); });
     if (near && !apart) {
       last->push_back(i);
@@ -160,8 +171,10 @@ SurveyedLandmark known_landmark(const track::Map& map, const Thing& thing, const
   const track::Landmark& known = *thing.known;
   found.known_id = known.id;
   found.landmark = known;
-  if (has_side(known.kind) && known.lateral_m == 0 && one_side(thing, all))
-    found.landmark.lateral_m = mean_lateral_m(thing, all);
+  // Once its sigma is that of a survey nobody takes its distance aside for a guess any more.
+  const double seen_m = mean_lateral_m(thing, all);
+  if (has_side(known.kind) && !track::is_aside_measured(known) && seen_m != 0 && one_side(thing, all))
+    found.landmark.lateral_m = seen_m;
   if (thing.is_apart) {
     found.runs_apart = runs_apart(thing, all, solver, place.place_m);
     found.apart_m = place.place_m - known.offset_m;

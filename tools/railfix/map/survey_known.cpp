@@ -9,6 +9,10 @@ namespace {
 
 using Marks = std::vector<const track::Landmark*>;
 
+bool may_be(const SurveySighting& seen, const track::Landmark& mark) {
+  return alike(seen, mark.kind, mark.edge, mark.lateral_m, track::is_aside_measured(mark));
+}
+
 /// The marks of one pass of a run, by dynamic programming over its sightings in the order along the edge: of all
 /// choices in that order the one whose squared distances are the least together.
 class PassMarks {
@@ -23,7 +27,7 @@ class PassMarks {
       for (size_t last = 0; last <= marks.size(); ++last) {
         Choice& choice = choices_[i][last];
         choice = {cost(i, last) + 1, last, first_of(i, last), false};  // a thing that the map does not have
-        if (last > 0 && alike(seen, marks[last - 1]->kind, marks[last - 1]->edge, marks[last - 1]->lateral_m)) {
+        if (last > 0 && may_be(seen, *marks[last - 1])) {
           const double reach_m = gate_m + 3.0 * std::hypot(marks[last - 1]->sigma_m, seen.run_sigma_m);
           const double off = std::abs(marks[last - 1]->offset_m - places[pass[i]]) / reach_m;
           if (off < 1) choice = std::min(choice, Choice{cost(i, before) + off * off, before, pass[i], true});

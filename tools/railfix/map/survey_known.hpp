@@ -5,16 +5,18 @@
 #include <vector>
 
 #include "map/survey.hpp"
+#include "track/aside.hpp"
 
 namespace railfix::tool {
 
 inline bool has_side(track::LandmarkKind kind) {
-  return kind == track::LandmarkKind::mast || kind == track::LandmarkKind::platform;
+  return track::stands_aside(kind);
 }
 
-/// Same kind, same track, same side.
-inline bool alike(const SurveySighting& a, track::LandmarkKind kind, uint32_t edge, double lateral_m) {
-  return a.kind == kind && a.edge == edge && (!has_side(kind) || a.lateral_m * lateral_m >= 0);
+/// Same kind, same track, as far aside: the masts of the track beside are seen as well.
+inline bool alike(const SurveySighting& a, track::LandmarkKind kind, uint32_t edge, double lateral_m,
+                  bool measured = true) {
+  return a.kind == kind && a.edge == edge && (!has_side(kind) || track::fits_aside(a.lateral_m, lateral_m, measured));
 }
 
 inline constexpr double kOnePassM = 50;  // of a run: no thing is passed twice within it, ...
