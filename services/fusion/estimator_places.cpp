@@ -254,10 +254,13 @@ bool Estimator::confirms_start(bool tells_track) {
 }
 
 // Any number of masts fits where others stand as far apart: map_matcher says when no other place near would have given
-// the same. GNSS is never so far off.
+// the same, and behind five in a row what is no mast tells. GNSS is never so far off.
 void Estimator::confirm_by(const FixInput& landmark) {
   if (is_only_told() && !confirms_start(landmark.tells_track)) return;
-  const bool confirms = landmark.sightings_fit == SightingsFit::here;
+  const auto* seen = place_.path->map().landmark(landmark.landmark);
+  const bool tells = seen != nullptr && seen->kind != track::LandmarkKind::mast;
+  const bool confirms =
+      landmark.sightings_fit == SightingsFit::here || (tells && place_.landmarks_agreed >= kLandmarksBelieved);
   if (place_.told_by != ToldBy::start || confirms) place_.told_by = ToldBy::nobody;
 }
 
