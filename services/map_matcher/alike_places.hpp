@@ -3,6 +3,8 @@
 // What stands unevenly, a balise, a frog or a bridge does not.
 #pragma once
 
+#include <algorithm>
+
 #include "map_matcher/sighting_history.hpp"
 #include "track/path.hpp"
 
@@ -16,6 +18,13 @@ struct TakenPlace {
   double now_m = 0;         // distance run
   double since_told_m = 0;  // way from where somebody told it, signed
 };
+
+/// Of a history for it.
+inline LandmarkParameters for_alike_places(LandmarkParameters parameters) {
+  constexpr double kWayM = 3000;  // over which distances between rare ones tell
+  parameters.history_m = std::max(parameters.history_m, kWayM);
+  return parameters;
+}
 
 class AlikePlaces {
  public:

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "map_matcher/alike_places.hpp"
 #include "map_matcher/inputs.hpp"
 
 namespace railfix::map_matcher {
@@ -28,19 +27,23 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   const Window window{expected_m, expected_m - prior.over_m - margin_m, expected_m + prior.under_m + margin_m};
   if (!begun_m_) begun_m_ = prior.travelled_m;
   const bool again = history_.make_room(sighting, place_m);
+  way_so_far_.make_room(sighting, place_m);
   auto candidates = landmarks_of_kind(*path_, sighting.kind, window.from_m, window.to_m);
   std::erase_if(candidates, [&](const auto* mark) { return !fits_aside(sighting, *mark); });
   if (candidates.size() > kMostCandidates) {
+    way_so_far_.add(sighting, place_m);
     history_.add(sighting, place_m);  // for when the window is smaller, or for those of a rarer kind
     return std::nullopt;
   }
   const Weights weights = weigh(sighting, place_m, window, candidates);
   if (weights.here > 0 && !again) {
     odds_elsewhere_ = std::clamp(weights.elsewhere / weights.here, std::min(odds_elsewhere_, kConfirmed), kMostOdds);
-    history_.unmapped(sighting.kind).learn(place_m, weights.nothing / weights.here);
+    for (auto* history : {&history_, &way_so_far_})
+      history->unmapped(sighting.kind).learn(place_m, weights.nothing / weights.here);
   }
   confirmed_ = odds_elsewhere_ <= (confirmed_ ? kLost : kConfirmed);
   history_.add(sighting, place_m);
+  way_so_far_.add(sighting, place_m);
   const double sum = weights.here + weights.elsewhere;
   const auto* best = weights.best;
   if (best == nullptr || !(weights.of_best >= parameters_.min_probability * sum)) return std::nullopt;
@@ -92,7 +95,7 @@ LandmarkMatcher::Weights LandmarkMatcher::weigh(const Sighting& sighting, double
 // weighed against the place, they would not be.
 bool LandmarkMatcher::is_told_apart(const track::PathLandmark& landmark, double place_m, const Window& window,
                                     const Prior& prior) const {
-  return !AlikePlaces(history_, *path_)
+  return !AlikePlaces(way_so_far_, *path_)
               .any({.shift_m = landmark.distance_m - place_m,
                     .least_m = window.from_m - place_m,
                     .most_m = window.to_m - place_m,

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "map_matcher/alike_places.hpp"
 #include "map_matcher/landmark_parameters.hpp"
 #include "map_matcher/match_types.hpp"
 #include "map_matcher/sighting_history.hpp"
@@ -16,7 +17,10 @@ namespace railfix::map_matcher {
 class LandmarkMatcher {
  public:
   LandmarkMatcher(const LandmarkParameters& parameters, std::shared_ptr<const track::Path> path)
-      : parameters_(parameters), path_(std::move(path)), history_(parameters) {
+      : parameters_(parameters),
+        path_(std::move(path)),
+        history_(parameters),
+        way_so_far_(for_alike_places(parameters)) {
     forget();
   }
 
@@ -34,6 +38,7 @@ class LandmarkMatcher {
   /// The travelled distance does not go on from the one before: earlier sightings say nothing any more.
   void forget() {
     history_.begin_anew();
+    way_so_far_.begin_anew();
     begun_m_.reset();
     odds_elsewhere_ = parameters_.elsewhere / (1 - parameters_.elsewhere);
     confirmed_ = told_apart_ = false;
@@ -64,6 +69,7 @@ class LandmarkMatcher {
   LandmarkParameters parameters_;
   std::shared_ptr<const track::Path> path_;
   SightingHistory history_;
+  SightingHistory way_so_far_;     // as many of them, from further back: balises alone come every kilometre
   std::optional<double> begun_m_;  // distance run at the first sighting
   double odds_elsewhere_ = 0;      // against that it is in the window
   bool confirmed_ = false;

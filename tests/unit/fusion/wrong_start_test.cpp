@@ -201,6 +201,22 @@ TEST_F(WrongStart, ThatIsRightIsOkFromTheLandmarkOnByWhichTheMatcherIsSure) {
   }
 }
 
+TEST_F(WrongStart, ThatIsRightIsOkFromTheFifthBaliseInARowOnAndNeverByMasts) {
+  for (const auto kind : {track::LandmarkKind::balise, track::LandmarkKind::mast}) {
+    auto map = std::make_shared<track::Map>(*straight_line());
+    for (uint32_t id = 1; id <= 8; ++id) map->landmarks.push_back({id, kind, 1, 900 + 40.0 * id, 0, 0.1, ""});
+    fusion_ = core::value_or_throw(
+        Fusion::create({.camera_lag_s = kAnyLagS}, map, track::EdgePosition{1, 900, track::Direction::forward}));
+    t_s_ = 0;
+    for (uint32_t landmark = 1; landmark <= 8; ++landmark) {
+      go(40, [] {});
+      fusion_.add(fix_at(t_s_, told_m(), landmark));
+      const bool is_ok = kind == track::LandmarkKind::balise && landmark >= 5;
+      EXPECT_EQ(run(fusion_, t_s_, t_s_ + 0.02, kSpeedMps).reason, is_ok ? "" : kOnlyTold) << landmark;
+    }
+  }
+}
+
 TEST_F(WrongStart, ThatGnssAgreesWithIsOkFromTheFirstLandmarkOnOrAtOnceWhereGnssIsSharp) {
   for (const uint8_t fix : {uint8_t{1}, uint8_t{4}, uint8_t{5}}) {
     for (const double hdop : {0.6, 1.0}) {

@@ -234,6 +234,27 @@ TEST(LandmarkMatcher, WhatStandsAmongEvenMastsConfirmsThePlaceForGood) {
   EXPECT_EQ(pass_even_masts(120, {{LandmarkKind::balise, 4010}}).here, 0);
 }
 
+// Each pair looks like every other one, but for the way from the one before.
+TEST(LandmarkMatcher, PairsOfBalisesAtUnevenDistancesConfirmThePlace) {
+  std::vector<std::pair<LandmarkKind, double>> balises;
+  for (const double m : {1000.0, 1650.0, 2500.0, 2990.0, 3900.0, 4500.0, 5450.0}) {
+    balises.emplace_back(LandmarkKind::balise, m);
+    balises.emplace_back(LandmarkKind::balise, m + 3);
+  }
+  LandmarkMatcher matcher({}, line_with(balises));
+  SightingsFit fit = SightingsFit::not_told;
+  for (const auto& [kind, m] : balises) {
+    const auto fix = matcher.add(sighting_of(kind, 0.95), prior_at(m - 5, 8, m - 5));
+    if (fix) fit = fix->sightings_fit;
+    if (m < 1640) {
+      EXPECT_NE(fit, SightingsFit::here) << "it may be any pair";
+    }
+    if (m > 3000) {
+      EXPECT_EQ(fit, SightingsFit::here) << m;
+    }
+  }
+}
+
 TEST(LandmarkMatcher, UnsureSightingGivesUnsureFix) {
   LandmarkMatcher matcher({}, line_with({{LandmarkKind::frog, 500}}));
   const auto fix = matcher.add(sighting_of(LandmarkKind::frog, 0.6), prior_at(495, 10, 0));
