@@ -202,8 +202,12 @@ bool TrainMouse::shown_again() const {
   const double least_mps =
       before_mps - options_.max_acceleration_mps2 * core::seconds(now_.stamp_ns - measured_stamp_ns_);
   const double least_m = least_mps * core::seconds(now_.stamp_ns - tentative_stamp_ns_);
-  const double moved_m = reference_->measured_m + motion_.now.mean(PoseErrors::kDistance) - tentative_distance_m_;
-  return least_m > kRepeatLeastM && std::abs(moved_m) < kRepeatShare * least_m;
+  return least_m > kRepeatLeastM && std::abs(moved_m()) < kRepeatShare * least_m;
+}
+
+// Since the last picture with any motion.
+double TrainMouse::moved_m() const {
+  return reference_->measured_m + motion_.now.mean(PoseErrors::kDistance) - tentative_distance_m_;
 }
 
 void TrainMouse::accept(MouseStep& step) {
@@ -213,8 +217,9 @@ void TrainMouse::accept(MouseStep& step) {
   const double measured_mps =
       std::clamp(recent_.speed_mps(kSpeedOverNs), -options_.max_speed_mps, options_.max_speed_mps);
   speed_mps_ = speed_known_ ? speed_mps_ + kSpeedGain * (measured_mps - speed_mps_) : measured_mps;
-  if (!confirmed_ && speed_known_) {
+  if (!confirmed_ && speed_known_ && !waits_after_doubt()) {
     confirmed_ = true;
+    doubt_stamp_ns_ = 0;
     const double bridge_m = bridge(measured_mps);
     measured_m += bridge_m;
     recent_.shift(bridge_m);
@@ -291,7 +296,7 @@ void TrainMouse::begin_anew() {
   standstill_ = Standstill(options_.standstill_m);
   speed_mps_ = 0;
   speed_known_ = confirmed_ = curves_known_ = false;
-  measured_stamp_ns_ = last_stamp_ns_ = 0;
+  measured_stamp_ns_ = last_stamp_ns_ = doubt_stamp_ns_ = rest_stamp_ns_ = 0;
   tentative_distance_m_ = distance_m_;
 }
 
@@ -315,6 +320,7 @@ MouseStep TrainMouse::process(const MousePicture& given) {
     return step;
   }
   if (!reference_) {
+    left_over_ = now_.coarse;  // takes its memory
     make_reference();
     reference_->errors = filter_.first(now_.prior);
     reference_->measured_m = reference_->distance_m = distance_m_;
@@ -342,7 +348,7 @@ MouseStep TrainMouse::process(const MousePicture& given) {
   const bool aligned = rough.found && align(rough, step);
   if (aligned && shown_again()) {
     step.mode = MouseMode::blind;  // reference and speed wait for the next picture
-  } else if (aligned) {
+  } else if (aligned && !doubtful()) {
     accept(step);
   } else {
     give_up(step);

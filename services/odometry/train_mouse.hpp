@@ -122,6 +122,10 @@ class TrainMouse {
   [[nodiscard]] PoseTie tie(double along_m) const;
   [[nodiscard]] double supported_speed_mps() const;
   [[nodiscard]] bool shown_again() const;
+  [[nodiscard]] double moved_m() const;
+  bool doubtful();
+  [[nodiscard]] bool waits_after_doubt() const;
+  bool shows_another_motion();
   void accept(MouseStep& step);
   [[nodiscard]] double scale_sigma() const;
   [[nodiscard]] double blur_sigma_m() const;
@@ -143,6 +147,7 @@ class TrainMouse {
   CoarseViewMaker coarse_maker_;
   ShiftSearch search_;
   Seen now_;
+  CoarseView left_over_;
   Motion motion_;
   Standstill standstill_;
   RecentPlaces recent_;  // since the last start anew
@@ -162,6 +167,9 @@ class TrainMouse {
   bool confirmed_ = false;
   int64_t restart_stamp_ns_ = 0;  // of the first picture after a gap
   double speed_before_gap_mps_ = 0;
+  int64_t doubt_stamp_ns_ = 0;   // of the last picture that showed two motions, 0 = no doubt
+  double rest_correlation_ = 0;  // of the patches at rest, lately ...
+  int64_t rest_stamp_ns_ = 0;    // ... until then, 0 = never
 };
 
 }  // namespace railfix::odometry

@@ -1,0 +1,78 @@
+// Is it the ground that stands or creeps, or only what most of the picture shows?
+//
+// Reflections, frost and dirt stay in the picture while the ground leaves under them; shadows leave while the ground
+// stays. Either way the picture shows two motions, the stronger of which would be believed. Neither is, until one of
+// them is gone.
+#include <algorithm>
+#include <cmath>
+
+#include "core/time.hpp"
+#include "odometry/train_mouse.hpp"
+
+namespace railfix::odometry {
+namespace {
+
+constexpr double kMayStandMps = 0.5;    // as slow as this a train may stand, ...
+constexpr double kSurelyMovingMps = 5;  // ... and while nothing is known of it, or in doubt, up to this
+constexpr int64_t kDoubtNs = core::kNsPerSecond / 2;
+constexpr double kOtherMotion = 0.16;  // correlation with what is left over; noise alone gives up to 0.13
+constexpr int kSameMotionRows = 2;     // coarse; nearer motions cannot be told apart, and ...
+constexpr double kBesideRows = 3.5;    // ... up to here what the found one's fraction of a row leaves over ...
+constexpr double kOtherEnergy = 0.01;  // ... is less of the picture's energy than this
+constexpr int kFewestCommonRows = 30;  // coarse
+constexpr double kLowestCorrelation = 0.75;
+constexpr double kUnexplainedGrowth = 2.5;  // of what rest leaves unexplained: ground that creeps is interpolated, ...
+constexpr double kUnexplainedMore = 0.05;   // ... and light changes
+constexpr double kCorrelationGain = 0.1;
+constexpr int64_t kRestMemoryNs = 10 * core::kNsPerSecond;
+
+}  // namespace
+
+// Two motions, or patches that fit worse than they did at rest: no answer, for as long as a leaving train needs to show
+// which of the two is its own.
+bool TrainMouse::doubtful() {
+  const double dt_s = core::seconds(now_.stamp_ns - tentative_stamp_ns_);
+  const double limit_mps = confirmed_ && doubt_stamp_ns_ == 0 ? kMayStandMps : kSurelyMovingMps;
+  const bool slow = std::abs(moved_m()) < limit_mps * dt_s || (speed_known_ && std::abs(speed_mps_) < limit_mps);
+  if (!slow) return false;
+  double correlation = 0;
+  for (const PatchMotion& patch : votes_) correlation += patch.correlation / static_cast<double>(votes_.size());
+  const bool remembered = rest_stamp_ns_ != 0 && now_.stamp_ns - rest_stamp_ns_ < kRestMemoryNs;
+  const double at_rest = 1 - kUnexplainedGrowth * (1 - rest_correlation_) - kUnexplainedMore;
+  if (correlation < std::max(kLowestCorrelation, remembered ? at_rest : 0) || shows_another_motion()) {
+    doubt_stamp_ns_ = now_.stamp_ns;
+    return true;
+  }
+  if (doubt_stamp_ns_ != 0 && now_.stamp_ns - doubt_stamp_ns_ < kDoubtNs) return true;
+  doubt_stamp_ns_ = 0;
+  rest_correlation_ =
+      remembered ? rest_correlation_ + kCorrelationGain * (correlation - rest_correlation_) : correlation;
+  rest_stamp_ns_ = now_.stamp_ns;
+  return false;
+}
+
+// What leaves at speed must have done so for a while before it is taken for the ground.
+bool TrainMouse::waits_after_doubt() const {
+  return doubt_stamp_ns_ != 0 && now_.stamp_ns - restart_stamp_ns_ < kDoubtNs;
+}
+
+// Takes the found motion's ground out of the picture and looks for the reference's ground elsewhere in what is left.
+bool TrainMouse::shows_another_motion() {
+  const CoarseView& then = reference_->seen.coarse;
+  const int rows = now_.coarse.rows;
+  const double cell_m = 2.0 * maker_->sheet().cell_m;
+  const double dt_s = core::seconds(now_.stamp_ns - tentative_stamp_ns_);
+  const double reach_m = options_.reference_length_m + options_.max_speed_mps * dt_s;
+  const int reach = static_cast<int>(std::min(reach_m / cell_m, static_cast<double>(rows - kFewestCommonRows)));
+  const int found = static_cast<int>(std::lround(motion_.along_m / cell_m));
+  const double left_share = take_out(then, now_.coarse, found, left_over_);
+  const auto shows = [&](RowRange shifts) {
+    if (shifts.first > shifts.last) return false;
+    const ShiftPeak peak = search_.find(then, left_over_, {0, rows - 1}, shifts, 1, 0);
+    const bool beside = std::abs(peak.rows - found) < kBesideRows;
+    return peak.score > kOtherMotion && (!beside || peak.score * peak.score * left_share > kOtherEnergy);
+  };
+  return shows({-reach, found - kSameMotionRows - 1}) || shows({found + kSameMotionRows + 1, reach});
+}
+
+}  // namespace railfix::odometry
