@@ -26,7 +26,27 @@ constexpr double kUnexplainedMore = 0.05;   // ... and light changes
 constexpr double kCorrelationGain = 0.1;
 constexpr int64_t kRestMemoryNs = 10 * core::kNsPerSecond;
 
+constexpr double kRepeatShare = 0.25;  // of the least way that a train must have gone: less is nothing
+
 }  // namespace
+
+// A picture that is shown again, but not bit for bit (film coded anew, a lost packet concealed), looks like standstill.
+// No train stops so soon: the way that it must have gone at least though nothing has moved, else 0.
+double TrainMouse::stopped_short_m() const {
+  if (measured_stamp_ns_ == 0) return 0;
+  // The mean lags behind a train that brakes.
+  const double before_mps = confirmed_ ? std::min(std::abs(supported_speed_mps()), std::abs(recent_.speed_mps(0)))
+                                       : std::abs(speed_before_gap_mps_);
+  const double least_mps =
+      before_mps - options_.max_acceleration_mps2 * core::seconds(now_.stamp_ns - measured_stamp_ns_);
+  const double least_m = std::max(0.0, least_mps) * core::seconds(now_.stamp_ns - tentative_stamp_ns_);
+  return std::abs(moved_m()) < kRepeatShare * least_m ? least_m : 0;
+}
+
+// Since the last picture with any motion.
+double TrainMouse::moved_m() const {
+  return reference_->measured_m + motion_.now.mean(PoseErrors::kDistance) - tentative_distance_m_;
+}
 
 // Two motions, or patches that fit worse than they did at rest: no answer, for as long as a leaving train needs to show
 // which of the two is its own.
