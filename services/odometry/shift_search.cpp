@@ -129,10 +129,8 @@ void CoarseViewMaker::normalise(CoarseView& out) {
   out.contrast_grey = seen_[rows] == 0 ? 0.0 : std::sqrt(energy_[rows] / seen_[rows]);
 }
 
-double take_out(const CoarseView& reference, const CoarseView& now, int shift, CoarseView& left_over) {
+void take_out(const CoarseView& reference, const CoarseView& now, int shift, CoarseView& left_over) {
   left_over = now;
-  int64_t whole = 0;
-  int64_t left = 0;
   for (int r = 0; r < now.rows; ++r) {
     const auto at = static_cast<size_t>(r);
     const int there = r + shift;
@@ -149,10 +147,7 @@ double take_out(const CoarseView& reference, const CoarseView& now, int shift, C
       energy += line[c] * line[c];
     }
     left_over.energy[at] = energy;
-    left += energy;
-    whole += now.energy[at];
   }
-  return whole == 0 ? 0 : static_cast<double>(left) / static_cast<double>(whole);
 }
 
 ShiftPeak ShiftSearch::find(const CoarseView& reference, const CoarseView& now, RowRange section, RowRange shifts,

@@ -56,8 +56,8 @@ struct ShiftPeak {
 };
 
 /// What the new view shows beside the reference's ground when that has moved by `shift` rows (as ShiftPeak::rows):
-/// noise, and whatever moves otherwise. Returns how much of the energy that is.
-double take_out(const CoarseView& reference, const CoarseView& now, int shift, CoarseView& left_over);
+/// noise, and whatever moves otherwise.
+void take_out(const CoarseView& reference, const CoarseView& now, int shift, CoarseView& left_over);
 
 /// Keeps its buffers between pictures.
 class ShiftSearch {

@@ -17,12 +17,12 @@ constexpr double kSurelyMovingMps = 5;  // ... and while nothing is known of it,
 constexpr int64_t kDoubtNs = core::kNsPerSecond / 2;
 constexpr double kOtherMotion = 0.16;  // correlation with what is left over; noise alone gives up to 0.13
 constexpr int kSameMotionRows = 2;     // coarse; nearer motions cannot be told apart, and ...
-constexpr double kBesideRows = 3.5;    // ... up to here what the found one's fraction of a row leaves over ...
-constexpr double kOtherEnergy = 0.01;  // ... is less of the picture's energy than this
+constexpr int kBesideRows = 4;         // ... up to here only a peak of its own is one
 constexpr int kFewestCommonRows = 30;  // coarse
 constexpr double kLowestCorrelation = 0.75;
 constexpr double kUnexplainedGrowth = 2.5;  // of what rest leaves unexplained: ground that creeps is interpolated, ...
 constexpr double kUnexplainedMore = 0.05;   // ... and light changes
+constexpr double kAsAtRest = 1.3;
 constexpr double kCorrelationGain = 0.1;
 constexpr int64_t kRestMemoryNs = 10 * core::kNsPerSecond;
 
@@ -59,7 +59,10 @@ bool TrainMouse::doubtful() {
   for (const PatchMotion& patch : votes_) correlation += patch.correlation / static_cast<double>(votes_.size());
   const bool remembered = rest_stamp_ns_ != 0 && now_.stamp_ns - rest_stamp_ns_ < kRestMemoryNs;
   const double at_rest = 1 - kUnexplainedGrowth * (1 - rest_correlation_) - kUnexplainedMore;
-  if (correlation < std::max(kLowestCorrelation, remembered ? at_rest : 0) || shows_another_motion()) {
+  const bool poor = correlation < std::max(kLowestCorrelation, remembered ? at_rest : 0);
+  // A few drops on the pane are no second motion while the patches fit as they did at rest.
+  const bool as_at_rest = remembered && 1 - correlation < kAsAtRest * (1 - rest_correlation_);
+  if (poor || (!as_at_rest && shows_another_motion())) {
     doubt_stamp_ns_ = now_.stamp_ns;
     return true;
   }
@@ -85,14 +88,20 @@ bool TrainMouse::shows_another_motion() {
   const double reach_m = options_.reference_length_m + options_.max_speed_mps * dt_s;
   const int reach = static_cast<int>(std::min(reach_m / cell_m, static_cast<double>(rows - kFewestCommonRows)));
   const int found = static_cast<int>(std::lround(motion_.along_m / cell_m));
-  const double left_share = take_out(then, now_.coarse, found, left_over_);
-  const auto shows = [&](RowRange shifts) {
-    if (shifts.first > shifts.last) return false;
-    const ShiftPeak peak = search_.find(then, left_over_, {0, rows - 1}, shifts, 1, 0);
-    const bool beside = std::abs(peak.rows - found) < kBesideRows;
-    return peak.score > kOtherMotion && (!beside || peak.score * peak.score * left_share > kOtherEnergy);
+  take_out(then, now_.coarse, found, left_over_);
+  const auto at_rows = [&](int first, int last) -> double {
+    const ShiftPeak peak =
+        search_.find(then, left_over_, {0, rows - 1}, {std::max(first, -reach), std::min(last, reach)}, 1, 0);
+    return peak.score > kOtherMotion ? std::abs(peak.rows - found) : 0;
   };
-  return shows({-reach, found - kSameMotionRows - 1}) || shows({found + kSameMotionRows + 1, reach});
+  // What the found motion's fraction of a row, and the camera's vibration, leave over falls off beside it.
+  const auto beside = [&](int first, int last) {
+    const double away = at_rows(first, last);
+    return away > kSameMotionRows + 0.25 && away < kBesideRows;
+  };
+  if (reach <= std::abs(found) + kBesideRows) return false;
+  return at_rows(-reach, found - kBesideRows) > 0 || at_rows(found + kBesideRows, reach) > 0 ||
+         beside(found - kBesideRows, found - kSameMotionRows) || beside(found + kSameMotionRows, found + kBesideRows);
 }
 
 }  // namespace railfix::odometry
