@@ -35,6 +35,33 @@ uint8_t mode_of(MouseMode mode) {
   return msg::ODOMETRY_BLIND;
 }
 
+const char* sentence_of(MouseWhy why) {
+  switch (why) {
+    case MouseWhy::no_texture:
+      return "blind: the ground shows no texture (dark, glare, snow or a covered lens)";
+    case MouseWhy::other_size:
+      return "blind: the pictures have another size than the calibration says";
+    case MouseWhy::not_newer:
+      return "blind: the pictures' time stamps do not grow";
+    case MouseWhy::shown_again:
+      return "blind: the same picture is shown again though the train moves";
+    case MouseWhy::two_motions:
+      return "part of the picture moves and part does not (a pattern on the pane, or moving shadows): the train's "
+             "motion "
+             "cannot be told";
+    case MouseWhy::repeats_itself:
+      return "the ground repeats itself: several motions are as likely";
+    case MouseWhy::none:
+    case MouseWhy::no_pose:
+    case MouseWhy::stamps_jump:
+    case MouseWhy::not_found:
+    case MouseWhy::beginning:
+    case MouseWhy::mount_guessed:
+      break;
+  }
+  return "the ground of one picture is not found in the next (wrong mount, or too fast)";
+}
+
 }  // namespace
 
 OdometryService::OdometryService(const Config& config, service::Context& context)
@@ -62,6 +89,9 @@ void OdometryService::restart() {
   last_step_ = {};
   last_seq_ = 0;
   last_valid_ns_ = 0;
+  last_measured_seq_ = 0;
+  last_off_m_ = 0;
+  out_of_order_ns_ = 0;
   if (mouse_) mouse_ = std::make_unique<TrainMouse>(intrinsics_, config_.mouse);
 }
 
@@ -141,6 +171,7 @@ void OdometryService::measure(const Waiting& waiting, const msg::TrackView* view
     picture.grey = waiting.grey;
     picture.stamp_ns = waiting.stamp_ns;
     picture.exposure_s = waiting.exposure_s;
+    picture.mount_guessed = !mount_known_;
     take_pose(waiting, view, picture);
     if (messaging::why_useless(waiting.health) != nullptr) {
       last_step_.stamp_ns = waiting.stamp_ns;
@@ -148,6 +179,7 @@ void OdometryService::measure(const Waiting& waiting, const msg::TrackView* view
       last_step_.valid = false;
     } else {
       last_step_ = mouse_->process(picture);
+      watch_stamps(last_step_, waiting);
       last_step_.step_sigma_m *= messaging::sigma_factor(waiting.health);
     }
     if (context_.in_charge()) publish(last_step_, waiting);
@@ -178,17 +210,34 @@ void OdometryService::publish(const MouseStep& step, const Waiting& waiting) {
   context_.health().output(waiting.grabbed_ns);
 }
 
+// Pictures in the wrong order jump ahead and back. What the train goes while stamps jump is a guess or lost, and a
+// distance has no sigma that could say it.
+void OdometryService::watch_stamps(const MouseStep& step, const Waiting& waiting) {
+  if (step.off_m * last_off_m_ < 0) out_of_order_ns_ = step.stamp_ns;
+  last_off_m_ = step.off_m;
+  if (step.why == MouseWhy::stamps_jump && waiting.frame_seq == last_measured_seq_ + 1) {
+    context_.log().warn(
+        "camera {}: stamps jump by {:.2f} s from one picture to the next; the distance over it is a guess",
+        config_.camera, core::seconds(waiting.stamp_ns - last_measured_ns_));
+  }
+  last_measured_seq_ = waiting.frame_seq;
+  last_measured_ns_ = waiting.stamp_ns;
+}
+
 void OdometryService::tell(const MouseStep& step, uint32_t picture_health) {
   const bool clock_set_back = step.stamp_ns < last_valid_ns_;
   if (step.valid || last_valid_ns_ == 0 || clock_set_back) last_valid_ns_ = step.stamp_ns;
-  if (step.stamp_ns - last_valid_ns_ > kBlindNs) {
-    const char* useless = messaging::why_useless(picture_health);
-    context_.health().degraded(useless != nullptr ? std::string("blind: ") + useless
-                               : step.mode == MouseMode::blind
-                                   ? "blind: the ground shows no texture (dark, glare, snow or a covered lens)"
-                                   : "the ground of one picture is not found in the next (wrong mount, or too fast)");
+  const char* useless = messaging::why_useless(picture_health);
+  const bool blind = step.stamp_ns - last_valid_ns_ > kBlindNs;
+  if (blind && useless != nullptr) {
+    context_.health().degraded(std::string("blind: ") + useless);
+  } else if (blind && step.why != MouseWhy::mount_guessed) {
+    context_.health().degraded(sentence_of(step.why));
   } else if (!mount_known_) {
-    context_.health().degraded("the camera's mount is not calibrated: run railfix calibrate mount");
+    context_.health().degraded(
+        "the camera's mount is not calibrated, so only standstill is told: run railfix calibrate mount");
+  } else if (out_of_order_ns_ != 0 && std::abs(step.stamp_ns - out_of_order_ns_) < kBlindNs) {
+    context_.health().degraded("the pictures come in the wrong order");
   } else if (step.valid) {
     context_.health().active();
   }

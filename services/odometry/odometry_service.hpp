@@ -32,6 +32,7 @@ class OdometryService {
   void take_pose(const Waiting& waiting, const msg::TrackView* view, MousePicture& picture);
   void publish(const MouseStep& step, const Waiting& waiting);
   void tell(const MouseStep& step, uint32_t picture_health);
+  void watch_stamps(const MouseStep& step, const Waiting& waiting);
   cv::Mat spare();
 
   Config config_;
@@ -51,6 +52,10 @@ class OdometryService {
   MouseStep last_step_;
   uint64_t last_seq_ = 0;
   int64_t last_valid_ns_ = 0;
+  uint64_t last_measured_seq_ = 0;
+  int64_t last_measured_ns_ = 0;
+  double last_off_m_ = 0;
+  int64_t out_of_order_ns_ = 0;  // when pictures were in the wrong order last, 0 = never
 };
 
 }  // namespace railfix::odometry

@@ -129,6 +129,27 @@ void CoarseViewMaker::normalise(CoarseView& out) {
   out.contrast_grey = seen_[rows] == 0 ? 0.0 : std::sqrt(energy_[rows] / seen_[rows]);
 }
 
+void take_out(const CoarseView& reference, const CoarseView& now, int shift, CoarseView& left_over) {
+  left_over = now;
+  for (int r = 0; r < now.rows; ++r) {
+    const auto at = static_cast<size_t>(r);
+    const int there = r + shift;
+    const bool common = there >= 0 && there < reference.rows && now.row_seen[at] != 0 &&
+                        reference.row_seen[static_cast<size_t>(there)] != 0;
+    left_over.row_seen[at] = common ? 1 : 0;
+    left_over.energy[at] = 0;
+    if (!common) continue;
+    const int16_t* then = reference.row(there);
+    int16_t* line = &left_over.texture[static_cast<size_t>(r * now.stride + CoarseView::kMostSide)];
+    int64_t energy = 0;
+    for (int c = 0; c < now.cols; ++c) {
+      line[c] = static_cast<int16_t>(line[c] - then[c]);
+      energy += line[c] * line[c];
+    }
+    left_over.energy[at] = energy;
+  }
+}
+
 ShiftPeak ShiftSearch::find(const CoarseView& reference, const CoarseView& now, RowRange section, RowRange shifts,
                             int side, int apart) {
   best_.assign(static_cast<size_t>(shifts.last - shifts.first + 1), -1.0);

@@ -55,6 +55,10 @@ struct ShiftPeak {
   double runner_up = -1;  // best score further than `apart` rows from the peak
 };
 
+/// What the new view shows beside the reference's ground when that has moved by `shift` rows (as ShiftPeak::rows):
+/// noise, and whatever moves otherwise.
+void take_out(const CoarseView& reference, const CoarseView& now, int shift, CoarseView& left_over);
+
 /// Keeps its buffers between pictures.
 class ShiftSearch {
  public:

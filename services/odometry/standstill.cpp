@@ -10,8 +10,9 @@ namespace {
 
 constexpr int64_t kWindowNs = core::kNsPerSecond;
 constexpr int64_t kShortNs = core::kNsPerSecond / 5;
-constexpr double kFullShare = 0.75;    // of a window: pictures do not end where it does
-constexpr double kSettledShare = 0.6;  // of the band, over the short window: 0.01 m/s does not settle at the default
+constexpr double kFullShare = 0.75;  // of a window: pictures do not end where it does
+constexpr double kSettledShare =
+    0.6;  // of the band, over the whole short window: 0.01 m/s does not settle at the default
 // A trembling camera: the two halves of the long window agree. 0.003 m/s does not settle.
 constexpr double kHalvesShare = 0.4;
 constexpr double kTrembleBands = 6;
@@ -36,7 +37,8 @@ bool Standstill::settled(double measured_m) {
            static_cast<double>(recent_.span_ns(first)) >= kFullShare * static_cast<double>(window_ns);
   };
   const size_t lately = recent_.since(kShortNs);
-  if (full(lately, kShortNs) && recent_.spread(lately, recent_.count()).range_m < kSettledShare * hold_m_) {
+  const double share = static_cast<double>(recent_.span_ns(lately)) / static_cast<double>(kShortNs);
+  if (full(lately, kShortNs) && recent_.spread(lately, recent_.count()).range_m < kSettledShare * share * hold_m_) {
     anchor_m_ = measured_m;
     return true;
   }

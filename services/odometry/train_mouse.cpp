@@ -23,9 +23,6 @@ constexpr double kLongestReferenceShare = 0.6;  // of the sheet that may have go
 constexpr double kSpeedGain = 0.5;
 constexpr double kSupportS = 2;  // of acceleration beside the last second's mean
 constexpr int64_t kSpeedOverNs = core::kNsPerSecond / 10;
-// A repeated picture: nothing moves though the train must have gone so far at least, of which ...
-constexpr double kRepeatLeastM = 0.02;
-constexpr double kRepeatShare = 0.25;     // ... less than this is nothing
 constexpr double kHeightShakeM = 0.0015;  // of the camera between two pictures: motors, ...
 constexpr double kBouncePerM = 0.02;      // ... the springs on the way, ...
 constexpr double kSettlingMps = 1e-4;     // ... people getting in
@@ -34,6 +31,10 @@ constexpr double kVerticalChangeM = 0.2;
 constexpr double kFadedScore = 0.6;  // at rest: the light has changed since the reference
 constexpr int64_t kShortestRestNs = 2 * core::kNsPerSecond;
 constexpr int64_t kClockSetBackNs = core::kNsPerSecond;  // no picture is as late as that
+constexpr double kRepeatLeastM = 0.02;  // less way in a picture shown again is only an error of the step
+constexpr double kLongestStepS = 1;     // a longer one between pictures is no step, unless ...
+constexpr double kUsualSteps = 3;       // ... it is not so many times as long as usual
+constexpr double kUsualGain = 0.2;
 
 bool finite(const geometry::CameraPose& pose) {
   return std::isfinite(pose.roll_rad + pose.pitch_rad + pose.yaw_rad + pose.lateral_m + pose.height_m);
@@ -109,6 +110,7 @@ void TrainMouse::make_reference() {
   now_.pose_measured = reference_->seen.pose_measured;
   reference_->errors = {};
   reference_->measured_m = reference_->distance_m = 0;
+  reference_->off_m = off_m_;
 }
 
 TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, double band_m) {
@@ -125,7 +127,8 @@ TrainMouse::Rough TrainMouse::find_roughly(bool full_band, double predicted_m, d
   const ShiftPeak whole = search_.find(reference_->seen.coarse, now_.coarse, {0, rows - 1}, shifts, 2, apart);
   rough.score = whole.score;
   if (whole.score < options_.lowest_score) return rough;
-  if (full_band && whole.runner_up > options_.ambiguity * whole.score) return rough;
+  rough.ambiguous = full_band && whole.runner_up > options_.ambiguity * whole.score;
+  if (rough.ambiguous) return rough;
   rough.found = true;
   rough.left_shift_m = -whole.cols * cell_m;
 
@@ -192,29 +195,21 @@ double TrainMouse::supported_speed_mps() const {
   return std::clamp(speed_mps_, mean_mps - change_mps, mean_mps + change_mps);
 }
 
-// A picture that is shown again, but not bit for bit (film coded anew, a lost packet concealed), looks like standstill.
-// No train stops so soon.
-bool TrainMouse::shown_again() const {
-  if (measured_stamp_ns_ == 0) return false;
-  // The mean lags behind a train that brakes.
-  const double before_mps = confirmed_ ? std::min(std::abs(supported_speed_mps()), std::abs(recent_.speed_mps(0)))
-                                       : std::abs(speed_before_gap_mps_);
-  const double least_mps =
-      before_mps - options_.max_acceleration_mps2 * core::seconds(now_.stamp_ns - measured_stamp_ns_);
-  const double least_m = least_mps * core::seconds(now_.stamp_ns - tentative_stamp_ns_);
-  const double moved_m = reference_->measured_m + motion_.now.mean(PoseErrors::kDistance) - tentative_distance_m_;
-  return least_m > kRepeatLeastM && std::abs(moved_m) < kRepeatShare * least_m;
-}
-
 void TrainMouse::accept(MouseStep& step) {
   const double dt_s = core::seconds(now_.stamp_ns - tentative_stamp_ns_);
   double measured_m = reference_->measured_m + motion_.now.mean(PoseErrors::kDistance);
   recent_.remember(now_.stamp_ns, measured_m);
   const double measured_mps =
       std::clamp(recent_.speed_mps(kSpeedOverNs), -options_.max_speed_mps, options_.max_speed_mps);
-  speed_mps_ = speed_known_ ? speed_mps_ + kSpeedGain * (measured_mps - speed_mps_) : measured_mps;
-  if (!confirmed_ && speed_known_) {
+  if (over_gap_) {
+    recent_.forget();  // what stamps say of that speed is nothing
+    recent_.remember(now_.stamp_ns, measured_m);
+  } else {
+    speed_mps_ = speed_known_ ? speed_mps_ + kSpeedGain * (measured_mps - speed_mps_) : measured_mps;
+  }
+  if (!confirmed_ && speed_known_ && !waits_after_doubt()) {
     confirmed_ = true;
+    doubt_stamp_ns_ = 0;
     const double bridge_m = bridge(measured_mps);
     measured_m += bridge_m;
     recent_.shift(bridge_m);
@@ -225,6 +220,7 @@ void TrainMouse::accept(MouseStep& step) {
   if (confirmed_) {
     distance_m_ = standstill_.report(now_.stamp_ns, measured_m);
     measured_stamp_ns_ = now_.stamp_ns;
+    unmeasured_ = 0;
     if (standstill_.resting() || std::abs(speed_mps_) < kSlowMps) speed_mps_ = standstill_.recent_speed_mps();
   }
   fill(step, confirmed_ ? distance_m_ : measured_m);
@@ -285,71 +281,110 @@ void TrainMouse::begin_places() {
   recent_.remember(tentative_stamp_ns_, tentative_distance_m_);
 }
 
-// The clock was set back, or a stamp was far ahead of the others: what is known of the motion is of no use.
+// The clock was set back, or a stamp was far ahead of the others: what is known of the motion is of no use, but for the
+// way of the pictures since.
 void TrainMouse::begin_anew() {
+  const double speed_mps = confirmed_ ? supported_speed_mps() : speed_before_gap_mps_;
+  if (measured_stamp_ns_ != 0) distance_m_ += speed_mps * std::min(unmeasured_ * usual_s_, options_.bridge_s);
   reference_.reset();
   standstill_ = Standstill(options_.standstill_m);
   speed_mps_ = 0;
   speed_known_ = confirmed_ = curves_known_ = false;
-  measured_stamp_ns_ = last_stamp_ns_ = 0;
+  measured_stamp_ns_ = last_stamp_ns_ = doubt_stamp_ns_ = rest_stamp_ns_ = 0;
   tentative_distance_m_ = distance_m_;
+}
+
+MouseStep TrainMouse::begin_step(const MousePicture& picture) {
+  MouseStep step;
+  step.stamp_ns = picture.stamp_ns;
+  step.reference_stamp_ns = picture.stamp_ns;
+  step.height_m = picture.pose.height_m + options_.texture_depth_m;
+  ++unmeasured_;
+  if (picture.stamp_ns < last_stamp_ns_ - kClockSetBackNs) {
+    begin_anew();
+    step.why = MouseWhy::stamps_jump;
+  }
+  step.distance_m = distance_m_;
+  if (picture.grey.type() != CV_8UC1 || picture.grey.cols != camera_.width_px ||
+      picture.grey.rows != camera_.height_px) {
+    step.why = MouseWhy::other_size;
+  } else if (picture.stamp_ns <= last_stamp_ns_) {
+    step.why = MouseWhy::not_newer;
+  } else if (!finite(picture.pose)) {
+    step.why = MouseWhy::no_pose;
+  }
+  return step;
 }
 
 MouseStep TrainMouse::process(const MousePicture& given) {
   MousePicture picture = given;
   picture.pose_measured = given.pose_measured && measured_wholly(given);
-  if (picture.stamp_ns < last_stamp_ns_ - kClockSetBackNs) begin_anew();
-  MouseStep step;
-  step.stamp_ns = picture.stamp_ns;
-  step.reference_stamp_ns = picture.stamp_ns;
-  step.distance_m = distance_m_;
-  step.height_m = picture.pose.height_m + options_.texture_depth_m;
-  if (picture.stamp_ns <= last_stamp_ns_ || picture.grey.type() != CV_8UC1 || picture.grey.cols != camera_.width_px ||
-      picture.grey.rows != camera_.height_px || !finite(picture.pose)) {
-    return step;
-  }
+  MouseStep step = begin_step(picture);
+  if (step.why != MouseWhy::none && step.why != MouseWhy::stamps_jump) return step;
   smooth_curves(picture);
-  const bool seen = look(picture);
-  if (!seen) {
-    last_stamp_ns_ = picture.stamp_ns;
-    return step;
-  }
-  if (!reference_) {
+  if (!look(picture)) {
+    step.why = MouseWhy::no_texture;
+  } else if (!reference_) {
+    left_over_ = now_.coarse;  // takes its memory
     make_reference();
     reference_->errors = filter_.first(now_.prior);
     reference_->measured_m = reference_->distance_m = distance_m_;
     tentative_stamp_ns_ = picture.stamp_ns;
     begin_places();
     step.mode = MouseMode::search;
-    last_stamp_ns_ = picture.stamp_ns;
-    return step;
+    if (step.why == MouseWhy::none) step.why = MouseWhy::beginning;
+  } else {
+    measure(picture, step);
   }
+  last_stamp_ns_ = picture.stamp_ns;
+  return step;
+}
 
+double TrainMouse::predicted_m(const MousePicture& picture) const {
+  if (!speed_known_)
+    return picture.speed_mps.value_or(0.0) * core::seconds(picture.stamp_ns - reference_->seen.stamp_ns);
+  return tentative_distance_m_ - reference_->measured_m +
+         speed_mps_ * core::seconds(picture.stamp_ns - tentative_stamp_ns_);
+}
+
+TrainMouse::Rough TrainMouse::find(const MousePicture& picture, double expected_m) {
   const double since_m_s = core::seconds(picture.stamp_ns - tentative_stamp_ns_);
   const double reference_s = core::seconds(picture.stamp_ns - reference_->seen.stamp_ns);
   const bool predicted = speed_known_ || picture.speed_mps.has_value();
-  const double speed_mps = speed_known_ ? speed_mps_ : picture.speed_mps.value_or(0.0);
-  const double known_m = speed_known_ ? tentative_distance_m_ - reference_->measured_m : 0.0;
-  const double predicted_m = predicted ? known_m + speed_mps * (speed_known_ ? since_m_s : reference_s) : 0.0;
+  if (over_gap_) return find_roughly(true, 0, maker_->sheet().rows * maker_->sheet().cell_m);
   double band_m = options_.search_band_m + options_.max_acceleration_mps2 * since_m_s * (since_m_s + 0.1);
-  if (!speed_known_) band_m = predicted ? band_m + 0.1 * std::abs(predicted_m) : options_.max_speed_mps * reference_s;
+  if (!speed_known_) band_m = predicted ? band_m + 0.1 * std::abs(expected_m) : options_.max_speed_mps * reference_s;
+  Rough rough = find_roughly(!predicted || since_m_s > kInertiaS, expected_m, band_m);
+  if (rough.found || !speed_known_) return rough;
+  return find_roughly(true, expected_m, 2.0 * band_m + kWrongStampS * std::abs(speed_mps_));
+}
 
-  Rough rough = find_roughly(!predicted || since_m_s > kInertiaS, predicted_m, band_m);
-  if (!rough.found && speed_known_)
-    rough = find_roughly(true, predicted_m, 2.0 * band_m + kWrongStampS * std::abs(speed_mps));
-  step.score = rough.score;
+void TrainMouse::measure(const MousePicture& picture, MouseStep& step) {
   step.reference_stamp_ns = reference_->seen.stamp_ns;
+  const double apart_s = core::seconds(picture.stamp_ns - last_stamp_ns_);
+  over_gap_ = usual_s_ > 0 && apart_s > std::max(kLongestStepS, kUsualSteps * usual_s_);
+  if (!over_gap_) usual_s_ = usual_s_ > 0 ? usual_s_ + kUsualGain * (apart_s - usual_s_) : apart_s;
+  const double expected_m = predicted_m(picture);
+  const Rough rough = find(picture, expected_m);
+  step.score = rough.score;
   const bool aligned = rough.found && align(rough, step);
-  if (aligned && shown_again()) {
+  repeated_m_ = aligned && !over_gap_ ? stopped_short_m() : 0;
+  if (repeated_m_ > kRepeatLeastM) {
     step.mode = MouseMode::blind;  // reference and speed wait for the next picture
-  } else if (aligned) {
+    step.why = MouseWhy::shown_again;
+  } else if (aligned && !doubtful()) {
+    step.off_m = off_inertia_m(expected_m);
+    off_m_ += step.off_m;
     accept(step);
+    say_validity(picture, step);
   } else {
+    step.why = over_gap_         ? MouseWhy::stamps_jump
+               : aligned         ? MouseWhy::two_motions
+               : rough.ambiguous ? MouseWhy::repeats_itself
+                                 : MouseWhy::not_found;
     give_up(step);
   }
   step.distance_m = distance_m_;
-  last_stamp_ns_ = picture.stamp_ns;
-  return step;
 }
 
 }  // namespace railfix::odometry

@@ -47,7 +47,8 @@ struct MousePicture {
   int64_t stamp_ns = 0;
   geometry::CameraPose pose;  // of this picture where measured, else the mount's or the last
   bool pose_measured = false;
-  PoseTrust trust;  // of a measured pose
+  bool mount_guessed = false;  // nobody has calibrated it: what is seen to move is so for any mount, but not how far
+  PoseTrust trust;             // of a measured pose
   double curvature_per_m = 0;
   double vertical_curvature_per_m = 0;
   double exposure_s = 0;            // 0 = not known
@@ -55,6 +56,22 @@ struct MousePicture {
 };
 
 enum class MouseMode : uint8_t { search, track, keyframe, blind };
+
+/// Why a step is not valid, where that can be told.
+enum class MouseWhy : uint8_t {
+  none,
+  no_texture,
+  no_pose,
+  other_size,      // than the calibration's
+  not_newer,       // than the picture before
+  stamps_jump,     // by more than a gap between pictures is
+  shown_again,     // though the train moves
+  two_motions,     // a pattern on the pane, or moving shadows
+  repeats_itself,  // the ground, so that several motions are as likely
+  not_found,
+  beginning,  // nothing to compare with, or not yet twice
+  mount_guessed
+};
 
 /// As odometry_step (idl/odometry.idl); step, lateral and yaw count from the reference picture.
 struct MouseStep {
@@ -72,6 +89,8 @@ struct MouseStep {
   double height_m = 0;
   MouseMode mode = MouseMode::blind;
   bool valid = false;
+  MouseWhy why = MouseWhy::none;
+  double off_m = 0;            // farther on than inertia allows: the stamp is wrong, or the pictures' order
   int patches = 0;             // that voted
   double matched = 0;          // share of the patches in sight that voted
   double agreement = 0;        // 0..1
@@ -106,9 +125,11 @@ class TrainMouse {
     PoseErrors errors;
     double measured_m = 0;  // distance there, ...
     double distance_m = 0;  // ... and as reported: less what was held back at rest
+    double off_m = 0;       // off_m_ there
   };
   struct Rough {  // displacement of the ground in two halves of the sheet
     bool found = false;
+    bool ambiguous = false;
     double score = 0;
     double near_m = 0, far_m = 0;
     double near_shift_m = 0, far_shift_m = 0;
@@ -117,18 +138,28 @@ class TrainMouse {
 
   bool look(const MousePicture& picture);
   void make_reference();
+  MouseStep begin_step(const MousePicture& picture);
+  void measure(const MousePicture& picture, MouseStep& step);
+  [[nodiscard]] double predicted_m(const MousePicture& picture) const;
+  [[nodiscard]] Rough find(const MousePicture& picture, double expected_m);
   [[nodiscard]] Rough find_roughly(bool full_band, double predicted_m, double band_m);
   bool align(const Rough& rough, MouseStep& step);
   [[nodiscard]] PoseTie tie(double along_m) const;
   [[nodiscard]] double supported_speed_mps() const;
-  [[nodiscard]] bool shown_again() const;
+  [[nodiscard]] double stopped_short_m() const;
+  [[nodiscard]] double moved_m() const;
+  bool doubtful();
+  [[nodiscard]] bool waits_after_doubt() const;
+  bool shows_another_motion();
   void accept(MouseStep& step);
+  [[nodiscard]] double off_inertia_m(double expected_m) const;
   [[nodiscard]] double scale_sigma() const;
   [[nodiscard]] double blur_sigma_m() const;
   [[nodiscard]] double turn_of_camera() const;
   /// Of the foot, in the reference picture.
   [[nodiscard]] double patches_ahead_m() const;
   void fill(MouseStep& step, double distance_m) const;
+  void say_validity(const MousePicture& picture, MouseStep& step) const;
   void renew_reference(const MouseStep& step, double dt_s);
   double bridge(double speed_after_mps);
   void give_up(MouseStep& step);
@@ -143,6 +174,7 @@ class TrainMouse {
   CoarseViewMaker coarse_maker_;
   ShiftSearch search_;
   Seen now_;
+  CoarseView left_over_;
   Motion motion_;
   Standstill standstill_;
   RecentPlaces recent_;  // since the last start anew
@@ -156,12 +188,20 @@ class TrainMouse {
   int64_t measured_stamp_ns_ = 0;    // of the last picture with a confirmed motion, 0 = none yet
   int64_t tentative_stamp_ns_ = 0;   // of the last picture with any motion
   double tentative_distance_m_ = 0;  // there, as measured
+  double off_m_ = 0;                 // sum of what steps were off inertia: wrong stamps, made good by later pictures
+  double repeated_m_ = 0;            // what the train may have gone in a picture that is shown again
+  bool over_gap_ = false;            // stamps say more time than pictures are apart
+  double usual_s_ = 0;               // between pictures, 0 = not known
+  int unmeasured_ = 0;               // pictures since the last confirmed motion
   double distance_m_ = 0;            // confirmed and reported
   double speed_mps_ = 0;
   bool speed_known_ = false;
   bool confirmed_ = false;
   int64_t restart_stamp_ns_ = 0;  // of the first picture after a gap
   double speed_before_gap_mps_ = 0;
+  int64_t doubt_stamp_ns_ = 0;   // of the last picture that showed two motions, 0 = no doubt
+  double rest_correlation_ = 0;  // of the patches at rest, lately ...
+  int64_t rest_stamp_ns_ = 0;    // ... until then, 0 = never
 };
 
 }  // namespace railfix::odometry

@@ -12,6 +12,10 @@ constexpr double kReliefSigmaM = 0.008;    // mean of the ground in sight agains
 constexpr double kUnseenPitchShare = 0.4;  // of the mount's pitch sigma that the ground does not take out; tuned alike
 // Of the square of the way during the exposure, by the share of the patches that is noise; tuned on simulated nights.
 constexpr double kBlurSigmaPerM = 0.2;
+constexpr double kGuessedScaleSigma = 0.3;
+// What a prediction is off without a wrong stamp, beside what the acceleration allows.
+constexpr double kPredictionM = 0.02;
+constexpr double kPredictionS = 0.008;
 
 }  // namespace
 
@@ -47,14 +51,25 @@ double TrainMouse::patches_ahead_m() const {
   return ahead_m;
 }
 
+// How much farther on the ground is than inertia allows; 0 where it allows it.
+double TrainMouse::off_inertia_m(double expected_m) const {
+  if (!confirmed_ || over_gap_) return 0;
+  const double dt_s = core::seconds(now_.stamp_ns - tentative_stamp_ns_);
+  const double allowed_m =
+      kPredictionM + kPredictionS * std::abs(speed_mps_) + options_.max_acceleration_mps2 * dt_s * (dt_s + 0.1);
+  const double off_m = motion_.along_m - expected_m;
+  return std::abs(off_m) > allowed_m ? off_m : 0;
+}
+
 void TrainMouse::fill(MouseStep& step, double distance_m) const {
   // With what this picture says of the reference's own distance, so that steps add up to the distance.
   step.step_m = distance_m - reference_->distance_m;
   step.lateral_m = motion_.lateral_m + 0.5 * now_.pose.curvature_per_m * motion_.along_m * motion_.along_m;
   step.yaw_rad = turn_of_camera();
-  // What standstill holds back is an error of the step that is known to be there.
+  // What standstill holds back is an error of the step that is known to be there. So is what one of the two pictures
+  // was off inertia: it does not show what was to be seen at its stamp.
   step.step_sigma_m = std::hypot(motion_.along_sigma_m, std::hypot(scale_sigma() * motion_.along_m, blur_sigma_m()),
-                                 step.step_m - motion_.along_m);
+                                 std::hypot(step.step_m - motion_.along_m, off_m_ - reference_->off_m, repeated_m_));
   step.yaw_sigma_rad = motion_.turn_sigma_rad;
   const double since_reference_s = core::seconds(now_.stamp_ns - reference_->seen.stamp_ns);
   step.lateral_speed_mps = step.lateral_m / since_reference_s;
@@ -66,7 +81,16 @@ void TrainMouse::fill(MouseStep& step, double distance_m) const {
   step.mode = !confirmed_                                   ? MouseMode::search
               : reference_->seen.stamp_ns == last_stamp_ns_ ? MouseMode::track
                                                             : MouseMode::keyframe;
-  step.valid = confirmed_;
+}
+
+// From a guessed mount lengths along the track may be wrong by a third, all with one sign. Rest is rest with any mount.
+void TrainMouse::say_validity(const MousePicture& picture, MouseStep& step) const {
+  step.valid = confirmed_ && !over_gap_;
+  if (!step.valid) step.why = over_gap_ ? MouseWhy::stamps_jump : MouseWhy::beginning;
+  if (!picture.mount_guessed || !step.valid) return;
+  step.step_sigma_m = std::hypot(step.step_sigma_m, kGuessedScaleSigma * step.step_m);
+  step.valid = standstill_.resting();
+  if (!step.valid) step.why = MouseWhy::mount_guessed;
 }
 
 }  // namespace railfix::odometry

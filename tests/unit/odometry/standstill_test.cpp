@@ -90,6 +90,18 @@ TEST(Standstill, AFastCameraSettlesToo) {
   for (int k = 0; k < 4000; ++k) ASSERT_EQ(at(10), stopped_m) << k;
 }
 
+TEST(Standstill, CreepingWith10MillimetresASecondIsNoRestAtAnyRate) {
+  for (const double rate_hz : {12.0, 15.0, 60.0}) {
+    Standstill standstill(0.003);
+    double reported_m = 0;
+    for (int i = 0; i < 10 * static_cast<int>(rate_hz); ++i) {
+      reported_m = standstill.report(core::to_ns(1 + i / rate_hz), 0.01 * i / rate_hz);
+      EXPECT_FALSE(i > rate_hz && standstill.resting()) << rate_hz << " " << i;
+    }
+    EXPECT_NEAR(reported_m, 0.1, 0.001) << rate_hz;
+  }
+}
+
 TEST(Standstill, ADepartureAtOnceIsSeenAtOnce) {
   Feed feed(0);
   EXPECT_EQ(feed.at(0.001), 0);

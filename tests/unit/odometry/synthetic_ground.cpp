@@ -89,7 +89,8 @@ cv::Mat SyntheticGround::picture(const geometry::Intrinsics& camera, const geome
     }
     if (std::abs(left) > 0.78) return 90.0F;
     if (std::abs(left) > 0.68) return 220.0F;  // a rail: the same all along
-    return ground(distance_m + along, left);
+    const float grey = ground(distance_m + along, left);
+    return light.cast ? grey * static_cast<float>(light.cast(along, left)) : grey;
   };
   cv::Mat out(camera.height_px, camera.width_px, CV_8UC1);
   const Eigen::Vector3f quarter(0, static_cast<float>(0.25 / camera.fv_px), 0);
@@ -99,6 +100,7 @@ cv::Mat SyntheticGround::picture(const geometry::Intrinsics& camera, const geome
       const Eigen::Vector3f& ray = rays_[static_cast<size_t>(v * camera.width_px + u)];
       double grey = 0.5 * (ground_at(ray - quarter) + ground_at(ray + quarter));
       if (light.shade) grey *= light.shade(u, v);
+      if (light.glare) grey += light.glare(u, v);
       if (++noise == noise_.size()) noise = 0;
       out.at<uchar>(v, u) = cv::saturate_cast<uchar>(light.gain * grey + light.bias + light.noise * noise_[noise]);
     }

@@ -30,7 +30,9 @@ class SyntheticGround {
     double gain = 1;
     double bias = 0;
     double noise = 2;
-    std::function<double(double u_px, double v_px)> shade;  // factor on the brightness of a pixel
+    std::function<double(double u_px, double v_px)> shade;      // factor on the brightness of a pixel
+    std::function<double(double u_px, double v_px)> glare;      // added to it
+    std::function<double(double along_m, double left_m)> cast;  // factor on the ground, ahead of the camera
   };
   /// The view when the camera's foot has gone `distance_m` along the track.
   cv::Mat picture(const geometry::Intrinsics& camera, const geometry::CameraPose& pose, double distance_m,

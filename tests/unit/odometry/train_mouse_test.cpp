@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "core/time.hpp"
 #include "unit/odometry/synthetic_ground.hpp"
@@ -33,7 +34,8 @@ class Ride {
   std::optional<geometry::CameraPose> pose_used;
   PoseTrust trust = PoseTrust::independent(0.0003, 0.002);
   SyntheticGround::Light light;
-  double exposure_s = 0;             // as it is told; the pictures are sharp
+  double exposure_s = 0;  // as it is told; the pictures are sharp
+  bool mount_guessed = false;
   double wrong_curvature_per_m = 0;  // added to what is told
 
  private:
@@ -45,6 +47,7 @@ class Ride {
     picture.pose = pose_used.value_or(shaken);
     picture.pose_measured = true;
     picture.exposure_s = exposure_s;
+    picture.mount_guessed = mount_guessed;
     picture.trust = trust;
     picture.curvature_per_m = options_.curvature_per_m + wrong_curvature_per_m;
     picture.vertical_curvature_per_m = options_.vertical_curvature_per_m;
@@ -314,7 +317,7 @@ TEST(TrainMouse, DroppedPicturesAreBridgedByTheirStamps) {
 TEST(TrainMouse, LatePictureIsLeftOut) {
   Ride ride;
   for (int i = 0; i < 6; ++i) ride.at(i / kRate, 0.4 * i);
-  EXPECT_FALSE(ride.at(3.5 / kRate, 0.4 * 3.5).valid);
+  EXPECT_EQ(ride.at(3.5 / kRate, 0.4 * 3.5).why, MouseWhy::not_newer);
   const MouseStep step = ride.at(6 / kRate, 2.4);
   EXPECT_TRUE(step.valid);
   EXPECT_NEAR(step.distance_m, 2.4, 0.012);
@@ -342,6 +345,86 @@ TEST(TrainMouse, BeginsAnewWhenTheClockIsSetBack) {
   EXPECT_NEAR(step.speed_mps, 12.0, 0.1);
   EXPECT_GT(step.distance_m, before_m + 0.8);
   EXPECT_LT(step.distance_m, 0.4 * 11 + 0.05);
+}
+
+TEST(TrainMouse, AStampThatJumpsIsNoSpeed) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 30; ++i) {
+    step = ride.at(i / kRate + (i >= 15 ? 2.0 : 0.0), 0.25 * i);
+    EXPECT_EQ(step.valid, i >= 2 && i != 15) << i;
+    EXPECT_EQ(step.why == MouseWhy::stamps_jump, i == 15) << i;
+    if (step.valid) {
+      EXPECT_NEAR(step.speed_mps, 7.5, 0.3) << i;
+      EXPECT_NEAR(step.distance_m, 0.25 * i, 0.02) << i;
+    }
+  }
+}
+
+TEST(TrainMouse, OneStampAnHourAheadCostsNoWay) {
+  Ride ride;
+  MouseStep step;
+  for (int i = 0; i <= 30; ++i) {
+    step = ride.at(i == 15 ? 3600 : i / kRate, 0.25 * i);
+    if (step.valid) {
+      EXPECT_NEAR(step.speed_mps, 7.5, 0.3) << i;
+    }
+  }
+  EXPECT_TRUE(step.valid);
+  EXPECT_NEAR(step.distance_m, 0.25 * 30, 0.05);
+}
+
+// As from cameras whose pictures are stamped as they come.
+TEST(TrainMouse, SigmaHoldsPicturesInTheWrongOrder) {
+  for (const double picture_m : {0.13, 0.35}) {
+    Ride ride;
+    std::map<int64_t, double> true_m;
+    int seen = 0;
+    for (int i = 0; i <= 60; ++i) {
+      const int shown = i > 20 && i % 5 == 0 ? i + 1 : i > 20 && i % 5 == 1 ? i - 1 : i;
+      const MouseStep step = ride.at(i / kRate, picture_m * shown);
+      true_m[step.stamp_ns] = picture_m * i;
+      if (!step.valid || i < 4) continue;
+      const double error_m = step.step_m - (true_m[step.stamp_ns] - true_m[step.reference_stamp_ns]);
+      EXPECT_LT(std::abs(error_m), 4 * step.step_sigma_m) << i;
+      if (step.off_m != 0) ++seen;
+    }
+    EXPECT_GT(seen, 10) << picture_m;
+  }
+}
+
+// Below the speed at which a repeated picture is no answer at all.
+TEST(TrainMouse, SigmaHoldsASlowPictureShownAgain) {
+  Ride ride;
+  double before_m = 0;
+  for (int i = 0; i <= 40; ++i) {
+    const bool repeated = i > 12 && i % 6 == 0;
+    const MouseStep step = repeated ? ride.again(i / kRate) : ride.at(i / kRate, 0.018 * i);
+    if (repeated && step.valid) {
+      const double error_m = step.distance_m - before_m - 0.018;
+      EXPECT_LT(std::abs(error_m), 3 * step.step_sigma_m) << i;
+    }
+    before_m = step.distance_m;
+  }
+}
+
+TEST(TrainMouse, FromAGuessedMountOnlyRestIsKnown) {
+  Ride ride;
+  ride.mount_guessed = true;
+  for (int i = 0; i <= 60; ++i) {
+    const double since_s = std::max(0.0, i / kRate - 0.5);
+    const MouseStep step = ride.at(i / kRate, since_s * since_s);
+    if (i <= 15 || i > 20) {
+      EXPECT_EQ(step.valid, i >= 2 && i <= 15) << i;
+    }
+    if (i > 20) {
+      EXPECT_EQ(step.why, MouseWhy::mount_guessed) << i;
+      EXPECT_GE(step.step_sigma_m, 0.2 * step.step_m) << i;
+    }
+    if (step.valid) {
+      EXPECT_EQ(step.speed_mps, 0) << i;
+    }
+  }
 }
 
 TEST(TrainMouse, ShakeOfTheCameraIsNotMotion) {
@@ -496,6 +579,7 @@ TEST(TrainMouse, WrongSizeIsRefused) {
   picture.grey = cv::Mat::zeros(10, 10, CV_8UC1);
   picture.stamp_ns = 5;
   EXPECT_FALSE(mouse.process(picture).valid);
+  EXPECT_EQ(mouse.process(picture).why, MouseWhy::other_size);
 }
 
 }  // namespace
