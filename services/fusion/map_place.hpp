@@ -145,7 +145,6 @@ class MapPlace {
   [[nodiscard]] bool fits_a_named_way(const MeasuredPlace& place, const MotionFilter& filter) const;
   Offer offer(const MeasuredPlace& place, const FixContext& context, TrainMotion& motion) const;
   Offer offer_again(const MeasuredPlace& place, MotionFilter& filter) const;
-  [[nodiscard]] bool is_mast(const FixInput& fix) const;
   [[nodiscard]] bool has_met(uint32_t landmark) const;
   [[nodiscard]] bool may_fit_by_chance(const FixInput& fix) const;
   void speak_for_track(const FixInput& fix, bool by_chance, const TrainMotion& motion);

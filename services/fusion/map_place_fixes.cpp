@@ -93,18 +93,12 @@ void MapPlace::compare(const FixInput& fix, double path_distance_m, const FixCon
   }
   corrected_ = false;
   const bool is_new = fix.kind == FixKind::landmark && !fix_.again;
-  if (is_new) known_.told.agrees(fix, is_mast(fix));
+  if (is_new) known_.told.agrees(fix);
   accept(fix, context, motion);
   if (!is_new) return;
   // It or the one before is wrong by more than it says, or both are: what makes one err makes its neighbour err alike.
   // Until the next one.
   if (fix_.sigmas_off(context.excess_m) >= kSurprisingSigmas) claimed_ = {reach_m(fix.sigma_m), reach_m(fix.sigma_m)};
-}
-
-// Or nobody knows what.
-bool MapPlace::is_mast(const FixInput& fix) const {
-  const auto* seen = known_.path->map().landmark(fix.landmark);
-  return seen == nullptr || seen->kind == track::LandmarkKind::mast;
 }
 
 bool MapPlace::has_met(uint32_t landmark) const {
@@ -254,7 +248,7 @@ void MapPlace::move_to(const FixInput& fix, double path_distance_m, const FixCon
   known_.track_doubt.changed();
   known_.turned_way.clear();
   known_.wrong_place.forget_turning();
-  known_.told.moved_to(fix, is_mast(fix));
+  known_.told.moved_to(fix);
   accept(fix, context, motion);
   // Either side: what told where to look for these two was wrong by as much. Until a third one agrees.
   claimed_ = {reach_m(fix.sigma_m), reach_m(fix.sigma_m)};

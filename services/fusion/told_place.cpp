@@ -7,9 +7,9 @@ constexpr int kCurvesConfirm = 3;  // a place that was only told
 
 }  // namespace
 
-void ToldPlace::agrees(const FixInput& landmark, bool is_mast) {
+void ToldPlace::agrees(const FixInput& landmark) {
   ++landmarks_agreed_;
-  confirm_by(landmark, is_mast);
+  confirm_by(landmark);
 }
 
 // Once so many in a row have agreed they are believed, whatever one says later.
@@ -19,9 +19,9 @@ void ToldPlace::disagrees(const FixInput& fix) {
   if (!believed()) landmarks_agreed_ = 0;
 }
 
-void ToldPlace::moved_to(const FixInput& fix, bool is_mast) {
+void ToldPlace::moved_to(const FixInput& fix) {
   landmarks_agreed_ = fix.kind == FixKind::landmark ? 2 : 0;
-  if (fix.kind == FixKind::landmark) confirm_by(fix, is_mast);
+  if (fix.kind == FixKind::landmark) confirm_by(fix);
 }
 
 // What agrees with the place says whether it is the right track, too.
@@ -31,10 +31,10 @@ bool ToldPlace::confirms_start(bool tells_track) {
   return tells_track;
 }
 
-// Any number of masts fits where others stand as far apart: map_matcher says when no other place near would have given
-// the same, and behind five in a row what is no mast tells. GNSS is never so far off.
-void ToldPlace::confirm_by(const FixInput& landmark, bool is_mast) {
-  along_known_ = along_known_ || landmark.sightings_fit == SightingsFit::here || (!is_mast && believed());
+// Any number of masts fits where others stand as far apart, and what stands among them may by chance: map_matcher says
+// when no other place near would have given the same. GNSS is never so far off.
+void ToldPlace::confirm_by(const FixInput& landmark) {
+  along_known_ = along_known_ || landmark.sightings_fit == SightingsFit::here;
   if (is_only_told() && !confirms_start(landmark.tells_track)) return;
   if (!is_only_told() || along_known_) confirm();
 }

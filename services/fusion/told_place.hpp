@@ -21,11 +21,11 @@ class ToldPlace {
   }
   void confirm() { by_ = ToldBy::nobody; }
   /// A landmark agrees with it ...
-  void agrees(const FixInput& landmark, bool is_mast);
+  void agrees(const FixInput& landmark);
   /// ... or any fix does not.
   void disagrees(const FixInput& fix);
   /// A second fix in a row says this other place, to which the train was moved.
-  void moved_to(const FixInput& fix, bool is_mast);
+  void moved_to(const FixInput& fix);
   /// The track bends here as it should.
   void curve_agrees(bool tells_track, bool turns_otherwise);
   /// GNSS has agreed with it, and with where the cab looks.
@@ -51,7 +51,7 @@ class ToldPlace {
  private:
   static constexpr int kLandmarksBelieved = 5;
   [[nodiscard]] bool confirms_start(bool tells_track);
-  void confirm_by(const FixInput& landmark, bool is_mast);
+  void confirm_by(const FixInput& landmark);
 
   ToldBy by_ = ToldBy::nobody;
   int bends_agreed_ = 0;  // curves that fitted a place that was only told

@@ -25,7 +25,6 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   const double margin_m = parameters_.window_margin_m + 3 * sighting.sigma_m;
   const double expected_m = prior.path_distance_m + sighting.distance_ahead_m;
   const Window window{expected_m, expected_m - prior.over_m - margin_m, expected_m + prior.under_m + margin_m};
-  if (!begun_m_) begun_m_ = prior.travelled_m;
   const bool again = history_.make_room(sighting, place_m);
   way_so_far_.make_room(sighting, place_m);
   auto candidates = landmarks_of_kind(*path_, sighting.kind, window.from_m, window.to_m);
@@ -42,12 +41,13 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
       history->unmapped(sighting.kind).learn(place_m, weights.nothing / weights.here);
   }
   confirmed_ = odds_elsewhere_ <= (confirmed_ ? kLost : kConfirmed);
+  told_apart_ = told_apart_ && confirmed_;
   history_.add(sighting, place_m);
   way_so_far_.add(sighting, place_m);
   const double sum = weights.here + weights.elsewhere;
   const auto* best = weights.best;
   if (best == nullptr || !(weights.of_best >= parameters_.min_probability * sum)) return std::nullopt;
-  told_apart_ = confirmed_ && (told_apart_ || is_told_apart(*best, place_m, window, prior));
+  told_apart_ = told_apart_ || (confirmed_ && is_told_apart(*best, place_m, window, prior));
   return Fix{sighting.stamp_ns,
              best->distance_m - sighting.distance_ahead_m,
              std::hypot(sighting.sigma_m, best->landmark->sigma_m),
@@ -100,7 +100,7 @@ bool LandmarkMatcher::is_told_apart(const track::PathLandmark& landmark, double 
                     .least_m = window.from_m - place_m,
                     .most_m = window.to_m - place_m,
                     .now_m = place_m,
-                    .since_told_m = prior.travelled_m - *begun_m_});
+                    .since_told_m = prior.travelled_m - told_m_});
 }
 
 }  // namespace railfix::map_matcher

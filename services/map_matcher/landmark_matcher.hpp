@@ -16,12 +16,13 @@ namespace railfix::map_matcher {
 
 class LandmarkMatcher {
  public:
-  LandmarkMatcher(const LandmarkParameters& parameters, std::shared_ptr<const track::Path> path)
+  /// told_m: travelled distance where the place was told.
+  LandmarkMatcher(const LandmarkParameters& parameters, std::shared_ptr<const track::Path> path, double told_m = 0)
       : parameters_(parameters),
         path_(std::move(path)),
         history_(parameters),
         way_so_far_(for_alike_places(parameters)) {
-    forget();
+    forget(told_m);
   }
 
   /// Another way with distances that go on from the old one's; the sightings so far stay.
@@ -36,10 +37,10 @@ class LandmarkMatcher {
   /// The same where it is more probable than not, which is worth saying; else 0.
   [[nodiscard]] double place_doubt() const { return doubt() > kDoubted ? doubt() : 0; }
   /// The travelled distance does not go on from the one before: earlier sightings say nothing any more.
-  void forget() {
+  void forget(double told_m) {
     history_.begin_anew();
     way_so_far_.begin_anew();
-    begun_m_.reset();
+    told_m_ = told_m;
     odds_elsewhere_ = parameters_.elsewhere / (1 - parameters_.elsewhere);
     confirmed_ = told_apart_ = false;
   }
@@ -69,9 +70,9 @@ class LandmarkMatcher {
   LandmarkParameters parameters_;
   std::shared_ptr<const track::Path> path_;
   SightingHistory history_;
-  SightingHistory way_so_far_;     // as many of them, from further back: balises alone come every kilometre
-  std::optional<double> begun_m_;  // distance run at the first sighting
-  double odds_elsewhere_ = 0;      // against that it is in the window
+  SightingHistory way_so_far_;  // as many of them, from further back: balises alone come every kilometre
+  double told_m_ = 0;
+  double odds_elsewhere_ = 0;  // against that it is in the window
   bool confirmed_ = false;
   bool told_apart_ = false;  // since then, from the places near where the sightings would be alike
 };

@@ -101,7 +101,7 @@ PlaceFixes MapMatcher::add(const StateInput& state) {
   if (!state.track_known && before && before->track_known) forget_place();
   search_.follow(state.track_known, state.usable);
   const bool anew = before && !counts_on(before->placed, state.placed);
-  if (landmarks_ && anew) landmarks_->forget();
+  if (landmarks_ && anew) landmarks_->forget(state.placed.distance_m);
   if (before && core::seconds(state.placed.stamp_ns - before->placed.stamp_ns) > FollowedPath::kOldStateS)
     silence_.begin_way();
   const auto path = followed_ ? followed_->path() : nullptr;
@@ -167,7 +167,7 @@ core::Status MapMatcher::follow(const StateInput& state) {
     landmarks_->change_path(path);
     curvature_->change_path(path);
   } else {
-    landmarks_.emplace(parameters_.landmarks, path);
+    landmarks_.emplace(parameters_.landmarks, path, state.placed.distance_m);
     silence_.begin_way();
     curvature_.emplace(parameters_.curvature_parameters(), path);
   }

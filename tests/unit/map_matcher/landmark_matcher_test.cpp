@@ -234,6 +234,29 @@ TEST(LandmarkMatcher, WhatStandsAmongEvenMastsConfirmsThePlaceForGood) {
   EXPECT_EQ(pass_even_masts(120, {{LandmarkKind::balise, 4010}}).here, 0);
 }
 
+// A cab that looks the other way from where it was told to be meets masts that stand there as they do here, the first
+// one behind a tunnel of 700 m.
+TEST(LandmarkMatcher, MastsThatStandAlikeOnEitherSideOfWhereTheStartWasToldDoNotConfirmWhereTheCabLooks) {
+  std::vector<std::pair<LandmarkKind, double>> mapped;
+  const std::vector<double> ways_m{700, 753, 821, 880, 961, 1009, 1090, 1141, 1215, 1270, 1352};
+  for (const double way_m : ways_m) {
+    mapped.emplace_back(LandmarkKind::mast, 4000 - way_m);
+    mapped.emplace_back(LandmarkKind::mast, 4000 + way_m);
+  }
+  std::ranges::sort(mapped, {}, &std::pair<LandmarkKind, double>::second);
+  const auto confirmed = [&](double told_m) {
+    LandmarkMatcher matcher({}, line_with(mapped), told_m);
+    int here = 0;
+    for (const double way_m : ways_m) {
+      const auto fix = matcher.add(sighting_of(LandmarkKind::mast, 0.95), prior_at(4000 + way_m - 5, 5, way_m - 5));
+      here += fix && fix->sightings_fit == SightingsFit::here ? 1 : 0;
+    }
+    return here;
+  };
+  EXPECT_EQ(confirmed(0), 0);
+  EXPECT_GT(confirmed(-9000), 3) << "told far away there is no such place";
+}
+
 // Each pair looks like every other one, but for the way from the one before.
 TEST(LandmarkMatcher, PairsOfBalisesAtUnevenDistancesConfirmThePlace) {
   std::vector<std::pair<LandmarkKind, double>> balises;
