@@ -50,8 +50,10 @@ struct OnLeg {
 struct OffLine {
   size_t leg = 0;
   int64_t stamp_ns = 0;
-  bool other_track = false;           // the map has that group elsewhere
-  std::optional<PlacedReport> other;  // what the other side said last, not long ago and on the line
+  bool beside_line = false;  // the other side is on the line before and behind, and names no such group there
+  /// The other side at this time, where it is on the line before and behind and its group and this one are not of one
+  /// ride: so far as the two were passed apart, the map has no way from the one to the other. One side is wrong.
+  std::optional<PlacedReport> contradicted_by;
 };
 
 /// What ours is at the time of a certified report with a position.

@@ -81,8 +81,10 @@ std::string text_of(const Doubts& doubts) {
         doubts.apart);
   }
   if (doubts.off_line > 0) {
-    return text_of("on %zu legs ours refers to a group that is not on the line, where the certified system is on it",
-                   doubts.off_line);
+    return text_of(
+        "on %zu legs ours refers to a group that is not on the line, where the certified system is on it; if the train "
+        "ran there, lead the line along with --via",
+        doubts.off_line);
   }
   if (doubts.other_groups > 0) {
     return text_of(
@@ -164,16 +166,19 @@ Verdict print_verdict(const Columns& columns, const Doubts& doubts, const Demand
     const char* doubt = doubts.stamps ? "stamps are off" : part;
     verdicts.push_back(
         print_ratio("error, RMS", compare_ratio(columns.errors, Figure::root_mean_square, demand), doubt));
-    const auto broken = compare_broken(columns.outside, demand);
+    auto broken = compare_broken(columns.outside, demand);
+    const bool elsewhere = doubts.off_line > 0 && broken.verdict == Verdict::at_least_as_good;
+    if (elsewhere) broken.verdict = Verdict::open;
     std::printf(
         "outside the interval     ours on %zu of %zu, certified on %zu of %zu legs; ours at most %.2g of legs, "
-        "demanded %.2g: %s\n",
+        "demanded %.2g: %s%s\n",
         broken.ours.broken, broken.ours.legs, broken.certified.broken, broken.certified.legs, broken.ours_at_most,
-        demand.broken_at_most, text_of(broken.verdict));
+        demand.broken_at_most, text_of(broken.verdict),
+        elsewhere ? "; ours refers to groups that are not on the line" : "");
     if (columns.ours_other_track + columns.certified_other_track > 0) {
       std::printf(
-          "... by a wrong group      ours %zu, certified %zu reports: one of another track, where the other side is "
-          "right\n",
+          "... by a wrong group      ours %zu, certified %zu reports: on another track than the other side, "
+          "which is right\n",
           columns.ours_other_track, columns.certified_other_track);
     }
     verdicts.push_back(broken.verdict);
