@@ -23,7 +23,7 @@ struct Doubts {
   size_t off_line = 0;              // ours refers to a group that is not on the line, and the certified system is on it
   size_t other_groups = 0;          // ours refers to a group from which nothing leads to the certified one
   // Certified reports.
-  size_t silent = 0;   // ours, known a moment ago, cannot be carried to them
+  size_t silent = 0;   // ours, known a moment ago, cannot be carried to them (Beside::silent)
   size_t heard = 0;    // ... and all at which ours was known a moment ago
   size_t outside = 0;  // from before our log begins or after it ends
   size_t in_all = 0;

@@ -69,7 +69,18 @@ struct Said {
   bool interval_known = false;
   uint64_t system = 0;
   std::optional<PlacedReport> place;
+  bool lrbg_on_line = false;
 };
+
+/// In packet 1: the line has the LRBG, and not the group before it.
+bool came_another_way(const Said& report) {
+  return report.position_known && !report.place && report.lrbg_on_line;
+}
+
+/// Counts from a group that the line does not have.
+bool is_off_line(const Said& report) {
+  return report.position_known && !report.place && !report.lrbg_on_line;
+}
 
 std::vector<Said> said(const std::vector<TimedReport>& reports, const Axes& axes) {
   std::vector<Said> all;
@@ -77,7 +88,7 @@ std::vector<Said> said(const std::vector<TimedReport>& reports, const Axes& axes
   for (const auto& report : reports) {
     const auto& fields = report.fields;
     all.push_back({report.stamp_ns, position_known(fields), interval_known(fields), co_ordinate_system(fields),
-                   axes.place(report)});
+                   axes.place(report), axes.place_of(fields.nid_lrbg).has_value()});
   }
   return all;
 }
@@ -195,10 +206,10 @@ Beside beside_alone(const Around& ours, const std::vector<Said>& certified, size
   const auto* next = ours.next;
   const bool lately = last != nullptr && certified[i].stamp_ns - last->stamp_ns <= longest_gap_ns;
   if (!lately || !last->position_known) return Beside::unknown;
-  const auto is_off_line = [&](const Said& one) {
-    return one.position_known && !one.place && !has_in_common(one, certified, i);
-  };
-  if (certified[i].place && (is_off_line(*last) || (next != nullptr && is_off_line(*next)))) return Beside::off_line;
+  const auto leaves_line = [&](const Said& one) { return is_off_line(one) && !has_in_common(one, certified, i); };
+  if (certified[i].place && (leaves_line(*last) || (next != nullptr && leaves_line(*next)))) return Beside::off_line;
+  if (came_another_way(certified[i]) || came_another_way(*last) || (next != nullptr && came_another_way(*next)))
+    return Beside::silent;
   if (next != nullptr && (!next->position_known || next->stamp_ns - last->stamp_ns > longest_gap_ns))
     return Beside::silent;
   return has_in_common(*last, certified, i) ? Beside::passing : Beside::other_group;
@@ -282,7 +293,7 @@ void count(const Side& side, const Side& others, const Axes& axes, int64_t longe
   const auto& said = side.said;
   for (size_t i = 0; i < said.size(); ++i) {
     if (said[i].place) counted.placed.push_back({leg_of(i), *said[i].place});
-    if (said[i].place || !said[i].position_known) continue;
+    if (!is_off_line(said[i])) continue;
     OffLine off_line{leg_of(i), said[i].stamp_ns, beside_line(said[i], others.said, longest_gap_ns), std::nullopt};
     if (off_line.beside_line && axes.names_other_track(side.reports[i].fields))
       off_line.contradicted_by = contradiction(side, i, others, axes, longest_gap_ns);
@@ -314,7 +325,7 @@ bool Pair::speeds_apart() const {
 }
 
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
-                int64_t longest_gap_ns) {
+                int64_t longest_gap_ns, std::optional<int64_t> ours_until_ns) {
   Pairing pairing;
   const auto legs = legs_of(certified);
   const auto stays = stays_of(certified);
@@ -326,11 +337,12 @@ Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedRep
   count(our_side, their_side, axes, longest_gap_ns, leg_of_ours, pairing.ours);
   count(
       their_side, our_side, axes, longest_gap_ns, [&](size_t i) { return legs[i]; }, pairing.certified);
+  const int64_t until_ns = own.empty() ? 0 : std::max(own.back().stamp_ns, ours_until_ns.value_or(own.back().stamp_ns));
   for (size_t i = 0; i < theirs.size(); ++i) {
     const Said& report = theirs[i];
     const int64_t stamp_ns = report.stamp_ns;
-    const bool outside = !own.empty() && (stamp_ns < own.front().stamp_ns - longest_gap_ns ||
-                                          stamp_ns > own.back().stamp_ns + longest_gap_ns);
+    const bool outside =
+        !own.empty() && (stamp_ns < own.front().stamp_ns - longest_gap_ns || stamp_ns > until_ns + longest_gap_ns);
     if (outside) {  // a log that begins late or ends early says nothing about the system
       ++pairing.outside_ours;
       continue;
