@@ -45,12 +45,13 @@ TEST(Columns, AGroupOfAnotherTrackIsABrokenPromiseWhereTheOtherSideIsRight) {
   const Axes line(track::Path::follow(balise_map(), forward(1, 0), 1900, 0).value());
   // At 70 s, on edge 2 at 400 m: 200 m beyond D, 700 m beyond C; on the siding 300 m beyond E.
   const auto judged_beside = [&](uint32_t group, uint32_t certified_group, double certified_m, bool behind = true,
-                                 bool turned = false) {
+                                 bool turned = false, double ours_before_s = 55) {
     auto certified = std::vector{report(55, kC, 400), report(69, certified_group, certified_m - 20)};
     if (turned) certified.insert(certified.begin() + 1, report(62, certified_group, 100, 72, false));
     if (behind) certified.push_back(report(71, certified_group, certified_m + 20));
     auto off_line = report(70, group, -300, 72, false);  // drawn towards the switch
-    return columns_of(pair_up({report(55, kC, 400), off_line}, certified, line, kGapNs), Judge{&truth, 0});
+    return columns_of(pair_up({report(ours_before_s, kC, 20 * ours_before_s - 700), off_line}, certified, line, kGapNs),
+                      Judge{&truth, 0});
   };
   const auto judged = [&](uint32_t group, double certified_m) { return judged_beside(group, kD, certified_m); };
   const auto broken = [](const Columns& found) {
@@ -65,6 +66,7 @@ TEST(Columns, AGroupOfAnotherTrackIsABrokenPromiseWhereTheOtherSideIsRight) {
   EXPECT_EQ(broken(judged_beside(kE, kD, 200, false)), 0U) << "perhaps the next one is on the siding";
   EXPECT_EQ(broken(judged_beside(kE, kC, 700)), 0U) << "passed before the switch";
   EXPECT_EQ(broken(judged_beside(kE, kD, 200, true, true)), 0U) << "turned back, and come over the switch";
+  EXPECT_EQ(broken(judged_beside(kE, kD, 200, true, false, 50)), 0U) << "perhaps so in a silence";
 }
 
 TEST(Columns, AStandstillIsItsFirstAndItsLast) {

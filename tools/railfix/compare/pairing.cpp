@@ -236,15 +236,18 @@ constexpr double kGroupsOffM = 12;  // Q_LOCACC of a group whose linking is not 
 constexpr double kWaysApartM = 50;  // by which a way on the map may be longer than as it was run
 constexpr double kWaysApartShare = 0.02;
 
-/// By report: the train passed the LRBG under way and has not turned back since, as far as this side says.
-std::vector<bool> passed_straight_on(const std::vector<TimedReport>& reports) {
+/// By report: the train passed the LRBG under way and has not turned back since, as far as this side says, without a
+/// silence.
+std::vector<bool> passed_straight_on(const std::vector<TimedReport>& reports, int64_t longest_gap_ns) {
   std::vector<bool> straight(reports.size());
   for (size_t i = 1; i < reports.size(); ++i) {
     const auto& before = reports[i - 1].fields;
     const auto& now = reports[i].fields;
     const bool away = now.q_dirtrain != etcs::kUnknownSide && now.q_dirtrain == now.q_dlrbg;
     const bool same = before.nid_lrbg == now.nid_lrbg;
-    straight[i] = away && (same ? straight[i - 1] && before.q_dirtrain == now.q_dirtrain : position_known(before));
+    const bool silent = reports[i].stamp_ns - reports[i - 1].stamp_ns > longest_gap_ns;
+    straight[i] =
+        away && !silent && (same ? straight[i - 1] && before.q_dirtrain == now.q_dirtrain : position_known(before));
   }
   return straight;
 }
@@ -253,7 +256,7 @@ std::vector<bool> passed_straight_on(const std::vector<TimedReport>& reports) {
 struct Side {
   const std::vector<TimedReport>& reports;
   const std::vector<Said>& said;
-  std::vector<bool> straight = passed_straight_on(reports);
+  std::vector<bool> straight;
 };
 
 /// OffLine::beside_line.
@@ -332,8 +335,8 @@ Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedRep
   const auto own = said(ours, axes);
   const auto theirs = said(certified, axes);
   const auto leg_of_ours = [&](size_t i) { return leg_at(ours[i].stamp_ns, certified, legs); };
-  const Side our_side{ours, own};
-  const Side their_side{certified, theirs};
+  const Side our_side{ours, own, passed_straight_on(ours, longest_gap_ns)};
+  const Side their_side{certified, theirs, passed_straight_on(certified, longest_gap_ns)};
   count(our_side, their_side, axes, longest_gap_ns, leg_of_ours, pairing.ours);
   count(
       their_side, our_side, axes, longest_gap_ns, [&](size_t i) { return legs[i]; }, pairing.certified);
