@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <limits>
 #include <numeric>
 #include <queue>
 #include <utility>
@@ -49,10 +48,12 @@ bool Network::no_way(uint32_t nid_lrbg, uint32_t other_nid_lrbg, double longest_
 bool Network::leads_to(const Place& from, const Place& to, double longest_m) const {
   using Begin = std::pair<double, size_t>;  // way to where the run begins, and the run
   std::priority_queue<Begin, std::vector<Begin>, std::greater<>> open;
-  std::vector<double> least_m(after_.size(), std::numeric_limits<double>::infinity());
+  std::unordered_map<size_t, double> least_m;  // of a large map few are near
   const auto reach = [&](double way_m, size_t run) {
-    if (way_m > longest_m || way_m >= least_m[run]) return;
-    least_m[run] = way_m;
+    if (way_m > longest_m) return;
+    const auto [known, is_new] = least_m.try_emplace(run, way_m);
+    if (!is_new && way_m >= known->second) return;
+    known->second = way_m;
     open.emplace(way_m, run);
   };
   for (const size_t run : {2 * from.edge, 2 * from.edge + 1}) {
