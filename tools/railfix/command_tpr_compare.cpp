@@ -182,7 +182,8 @@ void print_pairs(const compare::Pairing& pairing, const std::optional<compare::J
 }
 
 /// Reports that come now, until the other side's file is over, time is up, or Ctrl-C; each pair is told as it comes.
-void listen(ReportSource& ours, ReportSource& certified, Line& line, const CompareOptions& options) {
+/// When listening to ours ended, by its stamps; nothing where it is a file or nothing came.
+std::optional<int64_t> listen(ReportSource& ours, ReportSource& certified, Line& line, const CompareOptions& options) {
   const int64_t end_ns =
       options.for_s > 0 ? core::monotonic_ns() + core::to_ns(options.for_s) : std::numeric_limits<int64_t>::max();
   const auto over = [](const ReportSource& live, const ReportSource& other) {
@@ -190,9 +191,15 @@ void listen(ReportSource& ours, ReportSource& certified, Line& line, const Compa
            live.reports().back().stamp_ns > other.reports().back().stamp_ns;
   };
   size_t told = 0;
+  size_t heard = 0;
+  int64_t heard_ns = 0;  // when the last one of ours came
   for (bool goes_on = true; goes_on && core::monotonic_ns() < end_ns;) {
     for (auto* source : {&ours, &certified}) {
       if (source->live()) goes_on &= source->listen(kTurnS);
+    }
+    if (ours.reports().size() != heard) {
+      heard = ours.reports().size();
+      heard_ns = core::monotonic_ns();
     }
     const auto one_train = compare::of_one_train(ours.reports(), certified.reports());
     const auto* axes = one_train.ok() ? line.axes(one_train.value().certified) : nullptr;
@@ -208,6 +215,8 @@ void listen(ReportSource& ours, ReportSource& certified, Line& line, const Compa
     }
     goes_on &= !over(ours, certified) && !over(certified, ours);
   }
+  if (!ours.live() || heard == 0) return std::nullopt;
+  return ours.reports().back().stamp_ns + core::monotonic_ns() - heard_ns;
 }
 
 int print_comparison(const CompareOptions& options, const compare::Pairing& pairing,
@@ -278,7 +287,8 @@ int compare_reports(const CompareOptions& options) {
   Line line(options);
   if (!ours.live()) check_reports("--ours", options.ours, ours);
   if (!certified.live()) check_reports("--certified", options.certified, certified);
-  if (ours.live() || certified.live()) listen(ours, certified, line, options);
+  std::optional<int64_t> ours_until_ns;
+  if (ours.live() || certified.live()) ours_until_ns = listen(ours, certified, line, options);
   check_reports("--ours", options.ours, ours);
   check_reports("--certified", options.certified, certified);
   check_places("--ours", options.ours, ours.reports());
@@ -287,7 +297,8 @@ int compare_reports(const CompareOptions& options) {
   check_places("--certified", options.certified, theirs);
   const auto* axes = line.axes(theirs);
   if (axes == nullptr) throw core::BadInput(options.map + ": has none of the reported balise groups.");
-  const auto pairing = compare::pair_up(ours.reports(), theirs, *axes, core::to_ns(options.longest_gap_s));
+  const auto pairing =
+      compare::pair_up(ours.reports(), theirs, *axes, core::to_ns(options.longest_gap_s), ours_until_ns);
   std::optional<compare::Judge> judge;
   if (truth) judge = compare::Judge{&*truth, options.foot_to_front_m};
   std::printf("reports                  ours %zu, %zu with a place; certified %zu, %zu with a place\n",

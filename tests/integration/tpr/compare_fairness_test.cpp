@@ -24,20 +24,68 @@ constexpr double kFirstStampS = 1000;
 constexpr double kSpacingM = 1000;
 constexpr int kLegs = 130;
 
-/// One group every kilometre, also of the track beside it: those have numbers from kBeside on.
+/// One group every kilometre, also of the track beside it: those have numbers from kBeside on. The two are joined at
+/// the beginning.
 constexpr uint32_t kBeside = 9000;
-track::Map long_line() {
+track::Map long_line(bool joined) {
   track::Map map;
   const double length_m = (kLegs + 10) * kSpacingM;
-  map.edges = {{1, "main", 1, 2, "", track::Alignment::chained({0, 0, core::kPi / 2}, {{length_m, 0, 0}})},
-               {2, "beside", 3, 4, "", track::Alignment::chained({0, 4, core::kPi / 2}, {{length_m, 0, 0}})}};
+  const auto straight = [&](double northing_m) {
+    return track::Alignment::chained({0, northing_m, core::kPi / 2}, {{length_m, 0, 0}});
+  };
+  map.edges = {{1, "main", 1, 2, "", straight(0)}, {2, "beside", joined ? 1U : 3U, 4, "", straight(joined ? 0 : 4)}};
   map.nodes = {{1, track::NodeKind::end, "", 0, 0},
                {2, track::NodeKind::end, "", length_m, 0},
                {3, track::NodeKind::end, "", 0, 4},
                {4, track::NodeKind::end, "", length_m, 4}};
+  if (joined) {
+    map.edges.push_back({3, "stem", 3, 1, "", track::Alignment::chained({-100, 0, core::kPi / 2}, {{100, 0, 0}})});
+    map.nodes[0].kind = track::NodeKind::railway_switch;
+    map.nodes[2].easting_m = -100;
+    map.connections = {{1, 3, 1, false}, {1, 3, 2, true}};
+  }
   for (uint32_t i = 1; i * kSpacingM < length_m; ++i)
     for (const uint32_t edge : {1U, 2U})
       map.balise_groups.push_back({85, edge == 1 ? i : kBeside + i, edge, i * kSpacingM, true, true, 1, {}});
+  return map;
+}
+
+/// Edge 1, and a loop of 900 m beside it at each kilometre n with n % 5 == 3, from 50 m before its group on.
+track::Map loops() {
+  track::Map map;
+  const auto straight = [](double from_m, double length_m) {
+    return track::Alignment::chained({from_m, 0, core::kPi / 2}, {{length_m, 0, 0}});
+  };
+  const auto add_node = [&](double at_m) {
+    map.nodes.push_back({static_cast<uint32_t>(map.nodes.size() + 1), track::NodeKind::railway_switch, "", at_m, 0});
+  };
+  const auto add_edge = [&](double from_m, double length_m, uint32_t from, uint32_t to) {
+    const auto id = static_cast<uint32_t>(map.edges.size() + 1);
+    map.edges.push_back({id, "e" + std::to_string(id), from, to, "", straight(from_m, length_m)});
+    return id;
+  };
+  add_node(0);
+  double from_m = 0;
+  uint32_t before = 0;  // edges that end here
+  uint32_t loop_before = 0;
+  for (uint32_t k = 3; k <= kLegs; k += 5) {
+    const double switch_m = k * kSpacingM - 50;
+    const auto node = static_cast<uint32_t>(map.nodes.size());
+    add_node(switch_m);
+    add_node(switch_m + 900);
+    const auto plain = add_edge(from_m, switch_m - from_m, node, node + 1);
+    for (uint32_t i = static_cast<uint32_t>(from_m / kSpacingM) + 1; i < k; ++i)
+      map.balise_groups.push_back({85, i, plain, i * kSpacingM - from_m, true, true, 1, {}});
+    if (before != 0) map.connections.push_back({node, before, plain, false});
+    if (loop_before != 0) map.connections.push_back({node, loop_before, plain, true});
+    before = add_edge(switch_m, 900, node + 1, node + 2);
+    loop_before = add_edge(switch_m, 900, node + 1, node + 2);
+    map.balise_groups.push_back({85, k, before, 50, true, true, 1, {}});
+    map.balise_groups.push_back({85, kBeside + k, loop_before, 50, true, true, 1, {}});
+    map.connections.push_back({node + 1, plain, before, false});
+    map.connections.push_back({node + 1, plain, loop_before, true});
+    from_m = switch_m + 900;
+  }
   return map;
 }
 
@@ -46,18 +94,22 @@ uint32_t group_at(double place_m) {
 }
 
 /// A line of a table; `doubt_m` below 0 is not known.
-std::string line(double stamp_s, double front_m, double doubt_m, double speed_mps, uint32_t group_number_more = 0) {
+std::string line_from(uint32_t group, double stamp_s, double since_m, double doubt_m, double speed_mps) {
   etcs::TrainPositionReport report;
-  const uint32_t group = group_at(front_m);
-  report.nid_lrbg = 85U << 14U | (group + group_number_more);
+  report.nid_lrbg = 85U << 14U | group;
   report.q_scale = 0;
-  report.d_lrbg = static_cast<uint32_t>(std::lround((front_m - group * kSpacingM) * 10));
+  report.d_lrbg = static_cast<uint32_t>(std::lround(since_m * 10));
   report.q_dirlrbg = report.q_dlrbg = report.q_dirtrain = etcs::kNominal;
   report.l_doubtover = report.l_doubtunder =
       doubt_m < 0 ? uint32_t{etcs::kUnknownDistance} : static_cast<uint32_t>(std::lround(doubt_m * 10));
   report.v_train = static_cast<uint32_t>(std::lround(speed_mps * 3.6 / etcs::kSpeedStepKmh));
   return std::to_string(core::to_ns(kFirstStampS + stamp_s)) + ',' +
          etcs::to_hex(core::value_or_throw(etcs::encode(report, etcs::Baseline::b3))) + '\n';
+}
+
+std::string line(double stamp_s, double front_m, double doubt_m, double speed_mps, uint32_t group_number_more = 0) {
+  const uint32_t group = group_at(front_m);
+  return line_from(group + group_number_more, stamp_s, front_m - group * kSpacingM, doubt_m, speed_mps);
 }
 
 // From 20 to 40 m/s and back in ten minutes, from 1 km of the line on.
@@ -79,10 +131,11 @@ class TprCompareFairness : public ::testing::Test {
  protected:
   TprCompareFairness() {
     std::filesystem::create_directories(folder_ / "truth");
-    core::ok_or_throw(long_line().save(folder_ / "line.map"));
+    write_map(long_line(true));
   }
   ~TprCompareFairness() override { std::filesystem::remove_all(folder_); }
 
+  void write_map(const track::Map& map) const { core::ok_or_throw(map.save(folder_ / "line.map")); }
   /// Lines of the table.
   void write(const std::string& name, const std::string& lines) const {
     std::ofstream(folder_ / name) << "stamp_ns,hex\n" << lines;
@@ -267,8 +320,15 @@ TEST_F(TprCompareFairness, AnotherTrackIsNeverAsGood) {
   };
   write("ours.csv", ours(kBeside));
   auto text = said();
-  EXPECT_THAT(text, HasSubstr("outside the interval     ours on 129 of 129, certified on 0 of 129 legs"));
+  // The group of the first leg was passed before the log begins.
+  EXPECT_THAT(text, HasSubstr("outside the interval     ours on 128 of 129, certified on 0 of 129 legs"));
   EXPECT_THAT(text, HasSubstr("verdict                  WORSE; ours refers to groups of another track"));
+  write_map(long_line(false));  // it may lack the switch that the train ran over
+  text = said();
+  EXPECT_THAT(text, HasSubstr("outside the interval     ours on 0 of 129, certified on 0 of 129 legs"));
+  EXPECT_THAT(text, HasSubstr("not shown; ours refers to groups that are not on the line"));
+  EXPECT_THAT(text, HasSubstr("not shown: on 129 legs ours refers to a group that is not on the line"));
+  write_map(long_line(true));
   text = said_without_map();
   EXPECT_THAT(text, HasSubstr("not shown: on 129 legs ours refers to a group that cannot be compared"));
   write("ours.csv", ours(5000));  // on no map
@@ -276,6 +336,51 @@ TEST_F(TprCompareFairness, AnotherTrackIsNeverAsGood) {
   write("ours.csv", ours(0));
   EXPECT_THAT(said(), HasSubstr("verdict                  at least as good"));
   EXPECT_THAT(said_without_map(), HasSubstr("verdict                  intervals at least as good"));
+}
+
+// Between the certified reports only, every 10 s.
+TEST_F(TprCompareFairness, AnotherTrackBetweenTheCertifiedReportsIsNotAsGood) {
+  write_map(long_line(false));
+  write_truth([](double t) { return kMiddleMps * t; }, run_s());
+  const auto every_tenth = [](int t, double place_m, double since_m) {
+    return t % 10 == 0 ? good_line(t, place_m, since_m) : "";
+  };
+  write("certified.csv", steady_ride(every_tenth));
+  write("ours.csv", steady_ride([&](int t, double place_m, double since_m) {
+          return line(t, place_m, 5 + 0.05 * since_m, kMiddleMps, t % 10 > 2 && t % 10 < 8 ? kBeside : 0);
+        }));
+  EXPECT_THAT(said(), HasSubstr("legs ours refers to a group that is not on the line"));
+}
+
+// Every fifth kilometre is a loop that --via does not name: as long as the line, with groups of its own.
+TEST_F(TprCompareFairness, ALoopThatTheLineDoesNotTakeProvesNothing) {
+  write_map(loops());
+  write_truth([](double t) { return kMiddleMps * t; }, run_s());
+  // Groups are heard of at once or late; where this side has none in the loop it counts from the one before.
+  const auto ride = [&](double late_s, bool has_loops) {
+    std::string lines;
+    for (double t = 5; t < run_s(); t += 0.5) {
+      const double place_m = kSpacingM + kMiddleMps * t;
+      auto group = group_at(place_m - late_s * kMiddleMps);
+      const bool loop = group % 5 == 3;
+      if (loop && !has_loops) --group;
+      const double since_m = place_m - group * kSpacingM;
+      lines += line_from(loop && has_loops ? kBeside + group : group, t, since_m, 5 + 0.05 * since_m, kMiddleMps);
+    }
+    return lines;
+  };
+  for (const auto& [ours_s, certified_s] : {std::pair(0.0, 0.6), std::pair(0.6, 0.0)}) {
+    for (const bool ours_has : {true, false}) {
+      for (const bool certified_has : {true, false}) {
+        write("ours.csv", ride(ours_s, ours_has));
+        write("certified.csv", ride(certified_s, certified_has));
+        const auto text = said();
+        EXPECT_THAT(text, HasSubstr("outside the interval     ours on 0 of"));
+        EXPECT_THAT(text, HasSubstr(", certified on 0 of"));
+        EXPECT_EQ(text.find("lead the line along with --via") != std::string::npos, ours_has && !certified_has) << text;
+      }
+    }
+  }
 }
 
 // Ours is vaguer on the way, and silent there for little longer than it is carried.

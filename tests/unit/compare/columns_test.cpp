@@ -39,24 +39,34 @@ TEST(Columns, APromiseNeedsNoPartnerButATruthAndAnInterval) {
   EXPECT_EQ(certified, (std::vector<double>{0, 1}));
 }
 
-// E is on the siding, and A on the line; the group 9 is on no map.
+// E is on the siding, which D is passed beside; C lies before the switch. The group 9 is on no map.
 TEST(Columns, AGroupOfAnotherTrackIsABrokenPromiseWhereTheOtherSideIsRight) {
   const auto truth = steady();
-  const Axes line(track::Path::follow(balise_map(), forward(1, 0), 900, 0).value());
-  const auto judged = [&](uint32_t group, double certified_m) {
-    const auto pairing = pair_up({report(0, kA, -100), report(5, group, 100)},
-                                 {report(0, kA, -100), report(4, kA, certified_m - 100)}, line, kGapNs);
-    return columns_of(pairing, Judge{&truth, 0});
+  const Axes line(track::Path::follow(balise_map(), forward(1, 0), 1900, 0).value());
+  // At 70 s, on edge 2 at 400 m: 200 m beyond D, 700 m beyond C; on the siding 300 m beyond E.
+  const auto judged_beside = [&](uint32_t group, uint32_t certified_group, double certified_m, bool behind = true,
+                                 bool turned = false, double ours_before_s = 55) {
+    auto certified = std::vector{report(55, kC, 400), report(69, certified_group, certified_m - 20)};
+    if (turned) certified.insert(certified.begin() + 1, report(62, certified_group, 100, 72, false));
+    if (behind) certified.push_back(report(71, certified_group, certified_m + 20));
+    auto off_line = report(70, group, -300, 72, false);  // drawn towards the switch
+    return columns_of(pair_up({report(ours_before_s, kC, 20 * ours_before_s - 700), off_line}, certified, line, kGapNs),
+                      Judge{&truth, 0});
   };
+  const auto judged = [&](uint32_t group, double certified_m) { return judged_beside(group, kD, certified_m); };
   const auto broken = [](const Columns& found) {
     size_t count = 0;
     for (const auto& sample : found.outside) count += sample.ours > 0;
     return count;
   };
-  EXPECT_EQ(broken(judged(kE, 80)), 1U);
-  EXPECT_EQ(judged(kE, 80).ours_other_track, 1U);
+  EXPECT_EQ(broken(judged(kE, 200)), 1U);
+  EXPECT_EQ(judged(kE, 200).ours_other_track, 1U);
   EXPECT_EQ(broken(judged(kE, 300)), 0U) << "perhaps it is the line that is wrong";
-  EXPECT_EQ(broken(judged(85U << 14U | 9U, 80)), 0U) << "nobody knows where that is";
+  EXPECT_EQ(broken(judged(85U << 14U | 9U, 200)), 0U) << "nobody knows where that is";
+  EXPECT_EQ(broken(judged_beside(kE, kD, 200, false)), 0U) << "perhaps the next one is on the siding";
+  EXPECT_EQ(broken(judged_beside(kE, kC, 700)), 0U) << "passed before the switch";
+  EXPECT_EQ(broken(judged_beside(kE, kD, 200, true, true)), 0U) << "turned back, and come over the switch";
+  EXPECT_EQ(broken(judged_beside(kE, kD, 200, true, false, 50)), 0U) << "perhaps so in a silence";
 }
 
 TEST(Columns, AStandstillIsItsFirstAndItsLast) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "compare/other_fields.hpp"
@@ -316,6 +317,36 @@ TEST(Pairing, WhatLiesBeyondOurLogIsNoFaultOfTheSystem) {
   EXPECT_EQ(pairing.outside_ours, 10U) << "by more than is carried";
   EXPECT_EQ(pairing.availability.size(), 90U);
   EXPECT_EQ(pairing.alone, 30U);
+}
+
+// Live: nothing came from ours any more while it was listened to.
+TEST(Pairing, ASideThatFallsSilentWhileItIsListenedToIsNotKnown) {
+  std::vector<TimedReport> ours;
+  std::vector<TimedReport> certified;
+  for (int i = 0; i < 100; ++i) {
+    certified.push_back(report(i, kA, 20 * i));
+    if (i < 40) ours.push_back(certified.back());
+  }
+  const auto known = [&](std::optional<int64_t> until_ns) {
+    const auto pairing = pair_up(ours, certified, Axes(), kGapNs, until_ns);
+    return std::pair(pairing.availability.size(), std::ranges::count(pairing.availability, true, &Availability::ours));
+  };
+  EXPECT_EQ(known(std::nullopt), std::pair(55UL, 55L));
+  EXPECT_EQ(known(99 * core::kNsPerSecond), std::pair(100UL, 55L));
+  EXPECT_EQ(known(0), std::pair(55UL, 55L)) << "its last report was heard";
+}
+
+// E is on the siding, B and C are on the line: only what is nominal at C is not known.
+TEST(Pairing, WhoCameToTheLineByAnotherWayIsNotOnAnotherTrack) {
+  const Axes line(track::Path::follow(balise_map(), forward(1, 0), 1900, 0).value());
+  EXPECT_FALSE(line.names_other_track(report_from(kE, report(0, kC, 20)).fields));
+  EXPECT_TRUE(line.names_other_track(report_from(kC, report(0, kE, 20)).fields));
+  const std::vector<TimedReport> plain{report(0, kC, 0), report(1, kC, 20), report(2, kC, 40)};
+  std::vector<TimedReport> came;
+  for (const auto& one : plain) came.push_back(report_from(kE, one));
+  EXPECT_EQ(beside(came, plain, line), (std::vector<Beside>(3, Beside::silent)));
+  EXPECT_EQ(beside(plain, came, line), (std::vector<Beside>(3, Beside::silent)));
+  EXPECT_TRUE(pair_up(came, plain, line, kGapNs).ours.off_line.empty());
 }
 
 /// Every second for `length_s`, but for those that are left out.

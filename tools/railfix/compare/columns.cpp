@@ -47,7 +47,7 @@ double Judge::outside(const PlacedReport& report) const {
 }
 
 bool Judge::on_other_track(const OffLine& report) const {
-  return report.other_track && report.other && truth->at(report.stamp_ns) && outside(*report.other) == 0;
+  return report.contradicted_by && outside(*report.contradicted_by) == 0;
 }
 
 std::vector<Pair> without_repeats(const std::vector<Pair>& pairs) {

@@ -19,8 +19,9 @@ struct Judge {
   [[nodiscard]] double error_m(const PlacedReport& report) const;
   /// As compare_broken() takes it. An interval with an open end promises too little to count as kept.
   [[nodiscard]] double outside(const PlacedReport& report) const;
-  /// It names a group of another track, at a time at which the other side is on the line and right: there the line is
-  /// the true way. As `railfix evaluate` has it, the wrong group is a broken promise.
+  /// It is on another track than the other side, which is on the line before and behind and right there: passed beyond
+  /// the switch, the line is the true way. As `railfix evaluate` has it, the wrong group is a broken promise. On a loop
+  /// beside the line, which is as long, the distance alone proves nothing.
   [[nodiscard]] bool on_other_track(const OffLine& report) const;
 };
 

@@ -61,6 +61,14 @@ class Contradicted {
   std::map<size_t, std::pair<size_t, size_t>> legs_;  // pairs, and those that contradict
 };
 
+/// Ours may refer to other tracks between the certified reports only.
+size_t legs_off_line(const Counted& ours) {
+  Contradicted off_line(ours.placed.size() + ours.off_line.size());
+  for (const auto& report : ours.placed) off_line.add(report.leg, false);
+  for (const auto& report : ours.off_line) off_line.add(report.leg, report.beside_line);
+  return off_line.legs();
+}
+
 void look_beside(const std::vector<BesideCertified>& beside, Doubts& doubts) {
   Contradicted off_line(beside.size());
   Contradicted other_groups(beside.size());
@@ -130,6 +138,7 @@ Doubts doubts_of(const Pairing& pairing, const std::optional<Judge>& judge, doub
                 .ours_every_s = pairing.ours.every_s,
                 .certified_every_s = pairing.certified.every_s};
   look_beside(pairing.beside, doubts);
+  doubts.off_line = std::max(doubts.off_line, legs_off_line(pairing.ours));
   return doubts;
 }
 

@@ -20,10 +20,10 @@ struct Doubts {
   size_t runs_apart = 0;            // the same of the way that it runs
   size_t speeds_apart = 0;          // V_TRAIN
   std::optional<StampsOff> stamps;  // by more than chance, and so much that it matters
-  size_t off_line = 0;              // of a certified report on the line, ours refers to a group that is not on it
+  size_t off_line = 0;              // ours refers to a group that is not on the line, and the certified system is on it
   size_t other_groups = 0;          // ours refers to a group from which nothing leads to the certified one
   // Certified reports.
-  size_t silent = 0;   // ours, known a moment ago, cannot be carried to them
+  size_t silent = 0;   // ours, known a moment ago, cannot be carried to them (Beside::silent)
   size_t heard = 0;    // ... and all at which ours was known a moment ago
   size_t outside = 0;  // from before our log begins or after it ends
   size_t in_all = 0;

@@ -69,7 +69,18 @@ struct Said {
   bool interval_known = false;
   uint64_t system = 0;
   std::optional<PlacedReport> place;
+  bool lrbg_on_line = false;
 };
+
+/// In packet 1: the line has the LRBG, and not the group before it.
+bool came_another_way(const Said& report) {
+  return report.position_known && !report.place && report.lrbg_on_line;
+}
+
+/// Counts from a group that the line does not have.
+bool is_off_line(const Said& report) {
+  return report.position_known && !report.place && !report.lrbg_on_line;
+}
 
 std::vector<Said> said(const std::vector<TimedReport>& reports, const Axes& axes) {
   std::vector<Said> all;
@@ -77,7 +88,7 @@ std::vector<Said> said(const std::vector<TimedReport>& reports, const Axes& axes
   for (const auto& report : reports) {
     const auto& fields = report.fields;
     all.push_back({report.stamp_ns, position_known(fields), interval_known(fields), co_ordinate_system(fields),
-                   axes.place(report)});
+                   axes.place(report), axes.place_of(fields.nid_lrbg).has_value()});
   }
   return all;
 }
@@ -195,10 +206,10 @@ Beside beside_alone(const Around& ours, const std::vector<Said>& certified, size
   const auto* next = ours.next;
   const bool lately = last != nullptr && certified[i].stamp_ns - last->stamp_ns <= longest_gap_ns;
   if (!lately || !last->position_known) return Beside::unknown;
-  const auto is_off_line = [&](const Said& one) {
-    return one.position_known && !one.place && !has_in_common(one, certified, i);
-  };
-  if (certified[i].place && (is_off_line(*last) || (next != nullptr && is_off_line(*next)))) return Beside::off_line;
+  const auto leaves_line = [&](const Said& one) { return is_off_line(one) && !has_in_common(one, certified, i); };
+  if (certified[i].place && (leaves_line(*last) || (next != nullptr && leaves_line(*next)))) return Beside::off_line;
+  if (came_another_way(certified[i]) || came_another_way(*last) || (next != nullptr && came_another_way(*next)))
+    return Beside::silent;
   if (next != nullptr && (!next->position_known || next->stamp_ns - last->stamp_ns > longest_gap_ns))
     return Beside::silent;
   return has_in_common(*last, certified, i) ? Beside::passing : Beside::other_group;
@@ -221,16 +232,75 @@ std::optional<Pair> paired(const Around& ours, const PlacedReport& certified, in
   return pair;
 }
 
+constexpr double kGroupsOffM = 12;  // Q_LOCACC of a group whose linking is not known
+constexpr double kWaysApartM = 50;  // by which a way on the map may be longer than as it was run
+constexpr double kWaysApartShare = 0.02;
+
+/// By report: the train passed the LRBG under way and has not turned back since, as far as this side says, without a
+/// silence.
+std::vector<bool> passed_straight_on(const std::vector<TimedReport>& reports, int64_t longest_gap_ns) {
+  std::vector<bool> straight(reports.size());
+  for (size_t i = 1; i < reports.size(); ++i) {
+    const auto& before = reports[i - 1].fields;
+    const auto& now = reports[i].fields;
+    const bool away = now.q_dirtrain != etcs::kUnknownSide && now.q_dirtrain == now.q_dlrbg;
+    const bool same = before.nid_lrbg == now.nid_lrbg;
+    const bool silent = reports[i].stamp_ns - reports[i - 1].stamp_ns > longest_gap_ns;
+    straight[i] =
+        away && !silent && (same ? straight[i - 1] && before.q_dirtrain == now.q_dirtrain : position_known(before));
+  }
+  return straight;
+}
+
+/// One side's reports.
+struct Side {
+  const std::vector<TimedReport>& reports;
+  const std::vector<Said>& said;
+  std::vector<bool> straight;
+};
+
+/// OffLine::beside_line.
+bool beside_line(const Said& report, const std::vector<Said>& others, int64_t longest_gap_ns) {
+  const auto [last, next] = around(others, report.stamp_ns);
+  if (last == nullptr || next == nullptr || !last->place || !next->place) return false;
+  return report.stamp_ns - last->stamp_ns <= longest_gap_ns &&
+         !has_in_common(report, others, static_cast<size_t>(last - others.data()));
+}
+
+/// OffLine::contradicted_by of report `i`, which names a group of another track.
+std::optional<PlacedReport> contradiction(const Side& side, size_t i, const Side& others, const Axes& axes,
+                                          int64_t longest_gap_ns) {
+  const auto& fields = side.reports[i].fields;
+  const auto [last, next] = around(others.said, side.said[i].stamp_ns);
+  if (last == nullptr || next == nullptr || !last->place || !next->place) return std::nullopt;
+  if (next->stamp_ns - last->stamp_ns > longest_gap_ns) return std::nullopt;
+  if (!side.straight[i] || !others.straight[static_cast<size_t>(last - others.said.data())]) return std::nullopt;
+  double carried_m = 0;
+  auto other = carried(*last->place, *next->place, side.said[i].stamp_ns, carried_m);
+  const auto over_m = etcs::metres_if_known(fields.l_doubtover, fields.q_scale);
+  const auto under_m = etcs::metres_if_known(fields.l_doubtunder, fields.q_scale);
+  const auto& others_fields = last->place->fields;
+  const auto beyond = axes.place_of(others_fields.nid_lrbg);
+  if (!over_m || !under_m || !beyond || !std::isfinite(other.high_m - other.low_m)) return std::nullopt;
+  const double passed_m = other.front_m - last->place->running * etcs::metres(fields.d_lrbg, fields.q_scale);
+  const double apart_m = std::abs(passed_m - *beyond);
+  const double doubt_m = *over_m + *under_m + (other.high_m - other.low_m) + carried_m + 2 * kGroupsOffM;
+  const double longest_m = apart_m * (1 + kWaysApartShare) + doubt_m + kWaysApartM;
+  if (!axes.network().no_way(others_fields.nid_lrbg, fields.nid_lrbg, longest_m)) return std::nullopt;
+  return other;
+}
+
 /// Places of one side, and what it says of groups that the line does not have.
-void count(const std::vector<TimedReport>& reports, const std::vector<Said>& said, const std::vector<Said>& others,
-           const Axes& axes, int64_t longest_gap_ns, const std::function<size_t(size_t)>& leg_of, Counted& counted) {
+void count(const Side& side, const Side& others, const Axes& axes, int64_t longest_gap_ns,
+           const std::function<size_t(size_t)>& leg_of, Counted& counted) {
+  const auto& said = side.said;
   for (size_t i = 0; i < said.size(); ++i) {
     if (said[i].place) counted.placed.push_back({leg_of(i), *said[i].place});
-    if (said[i].place || !said[i].position_known) continue;
-    const auto* other = around(others, said[i].stamp_ns).last;
-    const bool lately = other != nullptr && said[i].stamp_ns - other->stamp_ns <= longest_gap_ns;
-    counted.off_line.push_back(
-        {leg_of(i), said[i].stamp_ns, axes.names_other_track(reports[i].fields), lately ? other->place : std::nullopt});
+    if (!is_off_line(said[i])) continue;
+    OffLine off_line{leg_of(i), said[i].stamp_ns, beside_line(said[i], others.said, longest_gap_ns), std::nullopt};
+    if (off_line.beside_line && axes.names_other_track(side.reports[i].fields))
+      off_line.contradicted_by = contradiction(side, i, others, axes, longest_gap_ns);
+    counted.off_line.push_back(off_line);
   }
 }
 
@@ -258,21 +328,24 @@ bool Pair::speeds_apart() const {
 }
 
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
-                int64_t longest_gap_ns) {
+                int64_t longest_gap_ns, std::optional<int64_t> ours_until_ns) {
   Pairing pairing;
   const auto legs = legs_of(certified);
   const auto stays = stays_of(certified);
   const auto own = said(ours, axes);
   const auto theirs = said(certified, axes);
   const auto leg_of_ours = [&](size_t i) { return leg_at(ours[i].stamp_ns, certified, legs); };
-  count(ours, own, theirs, axes, longest_gap_ns, leg_of_ours, pairing.ours);
+  const Side our_side{ours, own, passed_straight_on(ours, longest_gap_ns)};
+  const Side their_side{certified, theirs, passed_straight_on(certified, longest_gap_ns)};
+  count(our_side, their_side, axes, longest_gap_ns, leg_of_ours, pairing.ours);
   count(
-      certified, theirs, own, axes, longest_gap_ns, [&](size_t i) { return legs[i]; }, pairing.certified);
+      their_side, our_side, axes, longest_gap_ns, [&](size_t i) { return legs[i]; }, pairing.certified);
+  const int64_t until_ns = own.empty() ? 0 : std::max(own.back().stamp_ns, ours_until_ns.value_or(own.back().stamp_ns));
   for (size_t i = 0; i < theirs.size(); ++i) {
     const Said& report = theirs[i];
     const int64_t stamp_ns = report.stamp_ns;
-    const bool outside = !own.empty() && (stamp_ns < own.front().stamp_ns - longest_gap_ns ||
-                                          stamp_ns > own.back().stamp_ns + longest_gap_ns);
+    const bool outside =
+        !own.empty() && (stamp_ns < own.front().stamp_ns - longest_gap_ns || stamp_ns > until_ns + longest_gap_ns);
     if (outside) {  // a log that begins late or ends early says nothing about the system
       ++pairing.outside_ours;
       continue;

@@ -50,15 +50,18 @@ struct OnLeg {
 struct OffLine {
   size_t leg = 0;
   int64_t stamp_ns = 0;
-  bool other_track = false;           // the map has that group elsewhere
-  std::optional<PlacedReport> other;  // what the other side said last, not long ago and on the line
+  bool beside_line = false;  // the other side is on the line before and behind, and names no such group there
+  /// The other side at this time, where it is on the line before and behind and its group and this one are not of one
+  /// ride: so far as the two were passed apart, the map has no way from the one to the other. One side is wrong.
+  std::optional<PlacedReport> contradicted_by;
 };
 
 /// What ours is at the time of a certified report with a position.
 enum class Beside : uint8_t {
   paired,
   unknown,      // no position, or none lately: that is a matter of Availability
-  silent,       // a position, but the next one comes too late to carry it, or is unknown: nothing to compare with
+  silent,       // a position, but the next one comes too late to carry it, or is unknown: nothing to compare with. Or a
+                // side came to its group by a way that is not on the line (NID_PRVLRBG): nobody knows what is nominal
   off_line,     // the last or the next counts from a group that is not on the line, and the certified one is on it
   other_group,  // a position that cannot be compared
   passing,      // the two change to the next group one report apart, or name the same group, which the map lacks
@@ -90,8 +93,9 @@ struct Pairing {
 };
 
 /// Ours are carried between two reports on the same axis that follow each other and are at most `longest_gap_ns` apart.
+/// `ours_until_ns`: until then ours was listened to, if later than its last report; else its log ends with that.
 /// REQUIRES: both sorted.
 Pairing pair_up(const std::vector<TimedReport>& ours, const std::vector<TimedReport>& certified, const Axes& axes,
-                int64_t longest_gap_ns);
+                int64_t longest_gap_ns, std::optional<int64_t> ours_until_ns = std::nullopt);
 
 }  // namespace railfix::compare

@@ -54,16 +54,19 @@ double speed_kmh(const etcs::TrainPositionReport& fields) {
   return stands(fields) ? 0 : fields.v_train * etcs::kSpeedStepKmh;
 }
 
-Axes::Axes(const track::Path& path) : line_(std::in_place) {
+Axes::Axes(const track::Path& path) : line_(std::in_place), network_(path.map()) {
   for (const auto& mark : path.balise_groups())
     line_->insert({mark.group->nid_lrbg(), {mark.distance_m, mark.nominal_is_along_path}});
-  for (const auto& group : path.map().balise_groups) {
-    if (!line_->contains(group.nid_lrbg())) other_tracks_.insert(group.nid_lrbg());
-  }
 }
 
+std::optional<double> Axes::place_of(uint32_t nid_lrbg) const {
+  if (!line_ || !line_->contains(nid_lrbg)) return std::nullopt;
+  return line_->at(nid_lrbg).at_m;
+}
+
+/// The one before (NID_PRVLRBG) may be of the way by which the train came to the line.
 bool Axes::names_other_track(const etcs::TrainPositionReport& fields) const {
-  return other_tracks_.contains(fields.nid_lrbg) || (fields.nid_prvlrbg && other_tracks_.contains(*fields.nid_prvlrbg));
+  return line_ && !line_->contains(fields.nid_lrbg) && network_.has(fields.nid_lrbg);
 }
 
 /// The LRBG, and whether "nominal" is along the line.

@@ -3,8 +3,8 @@
 
 #include <map>
 #include <optional>
-#include <set>
 
+#include "compare/network.hpp"
 #include "compare/report_file.hpp"
 #include "track/path.hpp"
 
@@ -46,8 +46,11 @@ class Axes {
 
   /// Nothing when the report says "unknown", or a group that it names is not on the path.
   [[nodiscard]] std::optional<PlacedReport> place(const TimedReport& report) const;
-  /// The map has a group that the report names and that is not on the path.
+  /// Of a group, along the path.
+  [[nodiscard]] std::optional<double> place_of(uint32_t nid_lrbg) const;
+  /// The map has the LRBG, and the path has not.
   [[nodiscard]] bool names_other_track(const etcs::TrainPositionReport& fields) const;
+  [[nodiscard]] const Network& network() const { return network_; }
 
  private:
   struct Group {
@@ -56,7 +59,7 @@ class Axes {
   };
   [[nodiscard]] std::optional<Group> on_line(const etcs::TrainPositionReport& fields) const;
   std::optional<std::map<uint32_t, Group>> line_;
-  std::set<uint32_t> other_tracks_;  // groups of the path's map
+  Network network_;  // the path's map
 };
 
 }  // namespace railfix::compare

@@ -81,8 +81,10 @@ std::string text_of(const Doubts& doubts) {
         doubts.apart);
   }
   if (doubts.off_line > 0) {
-    return text_of("on %zu legs ours refers to a group that is not on the line, where the certified system is on it",
-                   doubts.off_line);
+    return text_of(
+        "on %zu legs ours refers to a group that is not on the line, where the certified system is on it; if the train "
+        "ran there, lead the line along with --via",
+        doubts.off_line);
   }
   if (doubts.other_groups > 0) {
     return text_of(
@@ -92,8 +94,9 @@ std::string text_of(const Doubts& doubts) {
   }
   if (doubts.ours_silent()) {
     return text_of(
-        "at %zu of %zu certified reports ours is silent for longer than --longest-gap-s, and what it would "
-        "have said is not known",
+        "at %zu of %zu certified reports ours is silent for longer than --longest-gap-s, or a side came to its group "
+        "by "
+        "another way (NID_PRVLRBG), and what it would have said is not known",
         doubts.silent, doubts.heard);
   }
   if (doubts.other_times()) {
@@ -164,16 +167,19 @@ Verdict print_verdict(const Columns& columns, const Doubts& doubts, const Demand
     const char* doubt = doubts.stamps ? "stamps are off" : part;
     verdicts.push_back(
         print_ratio("error, RMS", compare_ratio(columns.errors, Figure::root_mean_square, demand), doubt));
-    const auto broken = compare_broken(columns.outside, demand);
+    auto broken = compare_broken(columns.outside, demand);
+    const bool elsewhere = doubts.off_line > 0 && broken.verdict == Verdict::at_least_as_good;
+    if (elsewhere) broken.verdict = Verdict::open;
     std::printf(
         "outside the interval     ours on %zu of %zu, certified on %zu of %zu legs; ours at most %.2g of legs, "
-        "demanded %.2g: %s\n",
+        "demanded %.2g: %s%s\n",
         broken.ours.broken, broken.ours.legs, broken.certified.broken, broken.certified.legs, broken.ours_at_most,
-        demand.broken_at_most, text_of(broken.verdict));
+        demand.broken_at_most, text_of(broken.verdict),
+        elsewhere ? "; ours refers to groups that are not on the line" : "");
     if (columns.ours_other_track + columns.certified_other_track > 0) {
       std::printf(
-          "... by a wrong group      ours %zu, certified %zu reports: one of another track, where the other side is "
-          "right\n",
+          "... by a wrong group      ours %zu, certified %zu reports: on another track than the other side, "
+          "which is right\n",
           columns.ours_other_track, columns.certified_other_track);
     }
     verdicts.push_back(broken.verdict);
