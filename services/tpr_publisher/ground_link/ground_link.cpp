@@ -11,11 +11,13 @@ constexpr size_t kMostUnstored = 1000;
 constexpr std::chrono::seconds kRetrySoon{1};  // of the store, and of what the client did not take
 constexpr int kSilentKeepAlives = 2;           // as long as it takes at most to find a broker gone
 
-/// There may be reports of before in it.
+/// There may be reports of before in it: where the folder is missing, on a disk that is mounted late.
 bool may_hold_reports(const std::filesystem::path& file) {
   std::error_code failed;
   const auto bytes = std::filesystem::file_size(file, failed);
-  return failed ? failed != std::errc::no_such_file_or_directory : bytes > 0;
+  if (!failed) return bytes > 0;
+  if (failed != std::errc::no_such_file_or_directory) return true;
+  return file.has_parent_path() && !std::filesystem::is_directory(file.parent_path(), failed);
 }
 
 }  // namespace

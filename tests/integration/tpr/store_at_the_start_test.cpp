@@ -22,13 +22,15 @@ class StoreAtTheStart : public GroundLinkTest {
 TEST_F(StoreAtTheStart, ReportsGoFromMemoryUntilItCanBeOpened) {
   auto settings = link_settings(broker_.address());
   settings.store = file("disk") / "link.db";
+  settings.read_patience = std::chrono::seconds(1);
   tpr_publisher::GroundLink link(settings);
   EXPECT_FALSE(link.stores());
   EXPECT_THAT(link.trouble(), HasSubstr(settings.store.string() + ": unable to open database file. "));
   link.send(report(1));
   link.send(report(2));
   ASSERT_TRUE(wait_for([&] { return ground_->count() == 2; })) << link.trouble();
-  EXPECT_THAT(link.trouble(), HasSubstr("Reports go from memory: "));
+  ASSERT_TRUE(wait_for([&] { return link.trouble().find("Reports go from memory: ") != std::string::npos; }))
+      << link.trouble();
   fs::create_directories(file("disk"));
   ASSERT_TRUE(wait_for([&] { return link.stores() && link.trouble().empty(); })) << link.trouble();
   EXPECT_TRUE(fs::exists(settings.store));
@@ -42,6 +44,29 @@ TEST_F(StoreAtTheStart, ReportsGoFromMemoryUntilItCanBeOpened) {
   }
 }
 
+TEST_F(StoreAtTheStart, WhatLiesOnADiskThatIsMountedLateGoesBeforeWhatIsNew) {
+  auto settings = link_settings(broker_.address());
+  settings.store = file("disk") / "link.db";
+  fs::create_directories(file("disk"));
+  broker_.stop();
+  {
+    tpr_publisher::GroundLink before(settings);
+    for (uint64_t i = 1; i <= 3; ++i) before.send(report(i));
+  }
+  fs::rename(file("disk"), file("away"));
+  ASSERT_TRUE(broker_.start());
+  tpr_publisher::GroundLink link(settings);
+  link.send(report(4));
+  ASSERT_TRUE(wait_for([&] {
+    return link.connected() && link.trouble().find(": 1 wait in memory") != std::string::npos;
+  })) << link.trouble();
+  fs::rename(file("away"), file("disk"));
+  link.send(report(5));
+  ASSERT_TRUE(wait_for([&] { return ground_->count() == 5; })) << link.trouble();
+  const auto arrived = ground_->reports();
+  for (size_t i = 0; i < 5; ++i) EXPECT_EQ(arrived[i].stamp_ns, static_cast<int64_t>(i + 1));
+}
+
 TEST_F(StoreAtTheStart, TheTrainGetsItsReportsWithoutOne) {
   const auto disk = file("disk");
   const std::string link = "tpr_publisher.ground_link.";
@@ -49,7 +74,7 @@ TEST_F(StoreAtTheStart, TheTrainGetsItsReportsWithoutOne) {
                                  link + "longest_retry_s=0.2", link + "store=" + (disk / "reports.db").string()}));
   ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
   ASSERT_TRUE(run_for(3));
-  ASSERT_TRUE(status_says("unable to open database file. Reports go from memory: "));
+  ASSERT_TRUE(status_says("unable to open database file. Reports wait up to 60 s for those that may lie in it: "));
   EXPECT_EQ(status_->state(), msg::STATE_DEGRADED);
   fs::create_directories(disk);
   ASSERT_TRUE(run_until([&] { return status_->state() == msg::STATE_ACTIVE && ground_->count() >= 3; },
