@@ -72,6 +72,25 @@ TEST_F(BadBroker, ThatConfirmsNothingIsToldAndTheConnectionIsMadeAnewUntilItDoes
   EXPECT_THAT(stamps(3), ::testing::ElementsAre(1, 2, 3));
 }
 
+TEST_F(BadBroker, WhatItDidNotConfirmFromMemoryIsStoredAtTheEnd) {
+  broker_.confirms = false;
+  auto settings = bad_link();
+  settings.store = file("disk") / "link.db";
+  settings.read_patience = {};
+  {
+    tpr_publisher::GroundLink link(settings);
+    link.send(report(1));
+    link.send(report(2));
+    ASSERT_TRUE(wait_for([&] { return stamps(1).size() == 1; })) << link.trouble();
+    std::filesystem::create_directories(file("disk"));
+    ASSERT_TRUE(says(link, "The store works again; 1 reports of before")) << link.trouble();
+  }
+  broker_.confirms = true;
+  const tpr_publisher::GroundLink again(settings);
+  ASSERT_TRUE(wait_for([&] { return stamps(2).size() == 2; })) << again.trouble();
+  EXPECT_THAT(stamps(2), ::testing::UnorderedElementsAre(1, 2));
+}
+
 TEST_F(BadBroker, NothingOvertakesWhatWasUnderWayWhenItsConnectionBreaksBehindASlowDisk) {
   tpr_publisher::GroundLink link(bad_link());
   link.send(report(1));

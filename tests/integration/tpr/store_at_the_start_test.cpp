@@ -15,6 +15,9 @@ class StoreAtTheStart : public GroundLinkTest {
     ASSERT_TRUE(broker_.start());
     ASSERT_TRUE(ground_.emplace(broker_.address(), train_).subscribed());
   }
+  static bool says(const tpr_publisher::GroundLink& link, const char* text) {
+    return link.trouble().find(text) != std::string::npos;
+  }
   test::Broker broker_{file("broker")};
   std::optional<Ground> ground_;
 };
@@ -29,8 +32,7 @@ TEST_F(StoreAtTheStart, ReportsGoFromMemoryUntilItCanBeOpened) {
   link.send(report(1));
   link.send(report(2));
   ASSERT_TRUE(wait_for([&] { return ground_->count() == 2; })) << link.trouble();
-  ASSERT_TRUE(wait_for([&] { return link.trouble().find("Reports go from memory: ") != std::string::npos; }))
-      << link.trouble();
+  ASSERT_TRUE(wait_for([&] { return says(link, "Reports go from memory: "); })) << link.trouble();
   fs::create_directories(file("disk"));
   ASSERT_TRUE(wait_for([&] { return link.stores() && link.trouble().empty(); })) << link.trouble();
   EXPECT_TRUE(fs::exists(settings.store));
@@ -57,14 +59,43 @@ TEST_F(StoreAtTheStart, WhatLiesOnADiskThatIsMountedLateGoesBeforeWhatIsNew) {
   ASSERT_TRUE(broker_.start());
   tpr_publisher::GroundLink link(settings);
   link.send(report(4));
-  ASSERT_TRUE(wait_for([&] {
-    return link.connected() && link.trouble().find(": 1 wait in memory") != std::string::npos;
-  })) << link.trouble();
+  ASSERT_TRUE(wait_for([&] { return link.connected() && says(link, "it: 1 wait in memory"); })) << link.trouble();
   fs::rename(file("away"), file("disk"));
   link.send(report(5));
   ASSERT_TRUE(wait_for([&] { return ground_->count() == 5; })) << link.trouble();
   const auto arrived = ground_->reports();
   for (size_t i = 0; i < 5; ++i) EXPECT_EQ(arrived[i].stamp_ns, static_cast<int64_t>(i + 1));
+}
+
+TEST_F(StoreAtTheStart, WhatWaitsForOneThatStaysShutGoesAtTheEnd) {
+  auto settings = link_settings(broker_.address());
+  settings.warn = [](const std::string& sentence) { ADD_FAILURE() << sentence; };
+  auto other = settings;
+  other.mqtt.client_id += "-other";
+  const tpr_publisher::GroundLink has_the_store(other);
+  ASSERT_TRUE(wait_for([&] { return has_the_store.connected(); }));
+  {
+    tpr_publisher::GroundLink link(settings);
+    for (uint64_t i = 1; i <= 3; ++i) link.send(report(i));
+    ASSERT_TRUE(wait_for([&] { return link.connected() && says(link, "it: 3 wait in memory"); })) << link.trouble();
+    EXPECT_EQ(ground_->count(), 0U);
+  }
+  ASSERT_TRUE(wait_for([&] { return ground_->count() == 3; }));
+}
+
+TEST_F(StoreAtTheStart, WhatIsLostAtTheEndIsTold) {
+  auto settings = link_settings(broker_.address());
+  settings.store = file("disk") / "link.db";
+  std::vector<std::string> told;
+  settings.warn = [&](const std::string& sentence) { told.push_back(sentence); };
+  broker_.stop();
+  {
+    tpr_publisher::GroundLink link(settings);
+    link.send(report(1));
+    link.send(report(2));
+  }
+  const std::string text = "2 reports for the ground are lost: at the end they could not be stored (";
+  EXPECT_THAT(told, testing::ElementsAre(HasSubstr(text + settings.store.string() + ": unable to open")));
 }
 
 TEST_F(StoreAtTheStart, TheTrainGetsItsReportsWithoutOne) {
