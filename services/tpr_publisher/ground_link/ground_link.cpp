@@ -126,12 +126,13 @@ void GroundLink::work(bool store_all) {
   remove_delivered();
   if (store_all) store_under_way();
   store_new(store_all);
+  if (store_all) std::ranges::for_each(unstored_, [](Unstored& one) { one.behind = 0; });
   try_again();
   publish();
   say();
 }
 
-// What is stored goes at the next start; the rest now or never, also before what lies in a store that is shut.
+// What is stored goes at the next start; the rest now or never, also before what lies in a store.
 void GroundLink::say_farewell() {
   const auto until = Clock::now() + kFarewell;
   memory_goes_at_ = {};
