@@ -31,7 +31,7 @@ constexpr double kFirstRetryS = 0.1;
 constexpr int kIdBits = 16;
 constexpr int kMostConnections = 0x7FFF;  // that ids can tell apart
 constexpr int kFirstFailure = 0x80;       // of MQTT 5's reason codes
-constexpr int kSuspicious = 3;            // connections in a row that ended soon
+constexpr int kSuspicious = 3;            // connections in a row that ended soon, with nothing confirmed
 using Clock = std::chrono::steady_clock;
 
 std::string text_of(int code) {
@@ -77,9 +77,13 @@ class MqttClient::Connection {
     const std::lock_guard lock(client_mutex_);
     if (!connected_ || (over && *over != connections_)) return core::Error{"not connected"};
     int id = 0;
+    ++unconfirmed_;
     const int code = mosquitto_publish(client_.get(), &id, topic.c_str(), static_cast<int>(payload.size()),
                                        payload.data(), kQos1, false);
-    if (code != MOSQ_ERR_SUCCESS) return core::Error{text_of(code)};
+    if (code != MOSQ_ERR_SUCCESS) {
+      --unconfirmed_;
+      return core::Error{text_of(code)};
+    }
     return own_id(id);
   }
   void give_up(int connection, const std::string& why) {
@@ -143,9 +147,12 @@ class MqttClient::Connection {
     if (events_.connected) events_.connected({version_, connections_, doubt()});
   }
 
-  // Whoever is thrown out as soon as it was let in has not reached more than one that was not let in.
+  // Whoever is thrown out as soon as it was let in has not reached more than one that was not let in; but radio
+  // contacts are short, and reports go over them.
   void notice_whether_it_lasts() {
-    if (lasts_ || !established_at_ || Clock::now() - *established_at_ < kLasting) return;
+    if (lasts_ || !established_at_) return;
+    const bool all_confirmed = has_confirmed_ && unconfirmed_ == 0;
+    if (!all_confirmed && Clock::now() - *established_at_ < options_.lasting) return;
     const bool doubted = !doubt().empty();
     lasts_ = true;
     retry_s_ = kFirstRetryS;
@@ -188,7 +195,7 @@ class MqttClient::Connection {
     });
     mosquitto_publish_v5_callback_set(client_.get(),
                                       [](mosquitto*, void* self, int id, int code, const mosquitto_property*) {
-                                        static_cast<const Connection*>(self)->confirmed(id, code);
+                                        static_cast<Connection*>(self)->confirmed(id, code);
                                       });
     mosquitto_message_callback_set(client_.get(), [](mosquitto*, void* self, const mosquitto_message* message) {
       static_cast<Connection*>(self)->take(
@@ -216,7 +223,9 @@ class MqttClient::Connection {
     while (poll(&readable, 1, kHangUpMs) > 0 && read(socket, unread.data(), unread.size()) > 0) continue;
   }
 
-  void confirmed(int id, int code) const {
+  void confirmed(int id, int code) {
+    if (code < kFirstFailure) has_confirmed_ = true;
+    --unconfirmed_;
     if (code == MQTT_RC_NO_MATCHING_SUBSCRIBERS && events_.unheard) {
       events_.unheard(own_id(id));
     } else if (code < kFirstFailure) {
@@ -259,7 +268,8 @@ class MqttClient::Connection {
     refusal_.clear();
     version_is_unknown_ = false;
     established_at_.reset();
-    lasts_ = false;
+    lasts_ = has_confirmed_ = false;
+    unconfirmed_ = 0;
     try {
       make_client();
     } catch (const core::BadInput& error) {  // the certificates were there when this began
@@ -279,7 +289,7 @@ class MqttClient::Connection {
     const std::lock_guard lock(client_mutex_);
     connected_ = false;
     if (!given_up_.empty()) return std::exchange(given_up_, {});
-    if (established_at_ && !lasts_) ++ended_soon_;
+    if (established_at_ && !lasts_ && !has_confirmed_) ++ended_soon_;
     if (!refusal_.empty()) return refusal_;
     return code == MOSQ_ERR_KEEPALIVE ? silent() : text_of(code);
   }
@@ -311,7 +321,9 @@ class MqttClient::Connection {
   std::string refusal_;
   std::optional<Clock::time_point> established_at_;  // this connection
   bool lasts_ = false;
-  int ended_soon_ = 0;  // connections in a row
+  bool has_confirmed_ = false;        // something, over this connection
+  std::atomic<int> unconfirmed_ = 0;  // of what was published over it; any thread
+  int ended_soon_ = 0;                // connections in a row over which nothing was confirmed
   MqttVersion version_ = MqttVersion::v5;
   bool version_is_unknown_ = false;  // to the broker
   bool ended_ = false;               // by MqttNext

@@ -28,24 +28,24 @@ struct MqttOptions {
   int keep_alive_s = 10;        // a silent broker is given up after twice as long at most
   double longest_retry_s = 10;  // attempts begin 0.1 s apart, each pause is twice the one before, until one lasts
   std::string subscribe_to;     // topic filter, QoS 1; empty = none; refused, it breaks the connection
+  /// A connection that stood so long has lasted, and one over which all that was published is confirmed. Longer than
+  /// the usual pause between two clients that throw each other out under one id.
+  std::chrono::seconds lasting{15};
 };
-
-/// Longer than the usual pause between two clients that throw each other out under one id.
-inline constexpr std::chrono::seconds kLasting{15};
 
 enum class MqttVersion : uint8_t { v3_1_1 = 4, v5 = 5 };
 
 /// What follows a message that was received.
 enum class MqttNext : uint8_t {
   go_on,
-  enough,     // it is confirmed, and none behind it: the client ends
+  enough,     // it is confirmed, as far as there is room to send that, and none behind it: the client ends
   not_taken,  // nor is it: a broker that keeps the session delivers it again
 };
 
 struct MqttConnection {
   MqttVersion version = MqttVersion::v5;
   int number = 0;
-  std::string doubt;  // the ones before it ended soon; empty = they did not
+  std::string doubt;  // the ones before it ended soon, and nothing was confirmed over them; empty = not so
 };
 
 struct MqttRefusal {
@@ -65,7 +65,7 @@ struct MqttEvents {
   std::function<void(int id)> unheard = {};
   /// Asked behind every `received`. Where the client ends by it `disconnected` is the last event.
   std::function<MqttNext()> next = {};
-  /// A connection that was in doubt has stood for kLasting.
+  /// A connection that was in doubt has lasted.
   std::function<void()> lasts = {};
 };
 

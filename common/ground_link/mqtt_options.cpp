@@ -11,10 +11,12 @@ namespace railfix::ground_link {
 
 namespace {
 
-/// Also with the name of an interface behind it (fe80::1%eth0).
+/// Also with the name of an interface behind it (fe80::1%eth0), but with no port behind that.
 bool is_ipv6(const std::string& text) {
   in6_addr address{};
-  return inet_pton(AF_INET6, text.substr(0, text.find('%')).c_str(), &address) == 1;
+  const size_t end = text.find('%');
+  const bool has_port = end != std::string::npos && text.find(':', end) != std::string::npos;
+  return !has_port && inet_pton(AF_INET6, text.substr(0, end).c_str(), &address) == 1;
 }
 
 }  // namespace

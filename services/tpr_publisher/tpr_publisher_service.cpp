@@ -31,9 +31,10 @@ TprPublisherService::TprPublisherService(const Config& config, service::Context&
       publisher_(map_, settings_),
       told_(publisher_),
       writer_(context.writer(messaging::topics::train_position_report)) {
-  if (const auto link = config.ground_link.settings(context.common().train_id, context.common().host)) {
+  if (auto link = config.ground_link.settings(context.common().train_id, context.common().host)) {
     if (const auto plain = ground_link::plain_password(link->mqtt); !plain.empty())
       context.log().warn("Ground link: {}", plain);
+    link->warn = [&context](const std::string& sentence) { context.log().warn("{}", sentence); };
     ground_link_ = std::make_unique<GroundLink>(*link);
     context.watch_certificate("The ground link's certificate", config.ground_link.certificate_file);
     context.watch_certificate("The certificate of the broker's authority", config.ground_link.ca_file);

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 
 #include "command_tpr.hpp"
@@ -104,6 +105,15 @@ sigset_t hold_end_signals() {
   return ends;
 }
 
+/// Whole lines at once: two threads write, and whoever reads the other end reads no half of one.
+void tell(const std::string& sentence) {
+  std::cerr << sentence + "\n";
+}
+
+std::string not_connected(const ground_link::MqttOptions& mqtt, const std::string& why) {
+  return "not connected to " + ground_link::broker_of(mqtt) + " (" + why + ")";
+}
+
 class Listener {
  public:
   explicit Listener(const ListenOptions& options)
@@ -116,14 +126,14 @@ class Listener {
     return 0;
   }
   void tell_missing() const {
-    if (watch_.missing() > 0) std::cerr << watch_.missing() << " reports are missing\n";
+    if (watch_.missing() > 0) tell(std::to_string(watch_.missing()) + " reports are missing");
   }
 
  private:
   ground_link::MqttEvents events() {
     ground_link::MqttEvents events;
     events.connected = [this](auto) {
-      std::cerr << "connected\n";
+      tell("connected");
       const std::lock_guard lock(mutex_);
       connected_ = true;
       silence_.restart(core::monotonic_ns());
@@ -138,14 +148,14 @@ class Listener {
       kill(getpid(), SIGUSR1);
       return;
     }
-    std::cerr << "not connected to " << options_.mqtt.host << ":" << options_.mqtt.port << " (" << why << ")\n";
+    tell(not_connected(options_.mqtt, why));
     const std::lock_guard lock(mutex_);
     connected_ = false;
   }
   void received(std::span<const uint8_t> payload) {
     const auto report = ground_link::ground_report_from(payload);
     if (!report.ok()) {
-      std::cerr << report.error().message << '\n';
+      tell(report.error().message);
       return;
     }
     const auto& r = report.value();
@@ -166,8 +176,11 @@ class Listener {
   void tell_silent() {
     const std::lock_guard lock(mutex_);
     if (!connected_ || !(options_.silent_after_s > 0)) return;
-    for (const auto& train : silence_.fell_silent(core::monotonic_ns()))
-      std::cerr << train << " has been silent for " << options_.silent_after_s << " s\n";
+    for (const auto& train : silence_.fell_silent(core::monotonic_ns())) {
+      std::ostringstream text;
+      text << train << " has been silent for " << options_.silent_after_s << " s";
+      tell(text.str());
+    }
   }
 
   const ListenOptions& options_;
@@ -196,13 +209,14 @@ int forget(const ListenOptions& options) {
     forgotten = true;
     kill(getpid(), SIGUSR1);
   };
-  events.disconnected = [&](const std::string& why) {
-    std::cerr << "not connected to " << options.mqtt.host << ":" << options.mqtt.port << " (" << why << ")\n";
-  };
+  events.disconnected = [&](const std::string& why) { tell(not_connected(options.mqtt, why)); };
   const ground_link::MqttClient client(options.mqtt, events);
   int signal = 0;
   sigwait(&ends, &signal);
-  if (forgotten) std::cout << "the broker keeps nothing for " << options.mqtt.client_id << " any more\n";
+  if (forgotten) {
+    std::cout << "the broker keeps nothing for " << options.mqtt.client_id
+              << " any more; a listener that runs under this name begins it anew\n";
+  }
   return forgotten ? 0 : 1;
 }
 
@@ -213,7 +227,10 @@ void add_tpr_listen(CLI::App& tpr, Action& chosen) {
   options->mqtt.subscribe_to = "railfix/+/position_report";
   auto* command = tpr.add_subcommand("listen", "The ground side: print the reports that come over MQTT, each once");
   command->footer("Example: railfix tpr listen --broker ground.example:8883 --ca ca.pem --client-id rbc1");
-  command->add_option("--broker", options->broker, "MQTT broker, HOST or HOST:PORT")->capture_default_str();
+  command
+      ->add_option("--broker", options->broker,
+                   "MQTT broker, HOST or HOST:PORT, or [ADDRESS]:PORT with an IPv6 address")
+      ->capture_default_str();
   command->add_option("--topic", options->mqtt.subscribe_to, "MQTT topic filter")->capture_default_str();
   auto* named = command->add_option(
       "--client-id", options->mqtt.client_id,
@@ -222,7 +239,8 @@ void add_tpr_listen(CLI::App& tpr, Action& chosen) {
       "it with --forget");
   command
       ->add_flag("--forget", options->forget,
-                 "Listen to nothing: let the broker forget --client-id and what it keeps for it")
+                 "Listen to nothing: let the broker forget --client-id and what it keeps for it; end the listener of "
+                 "that name first, it would begin it anew")
       ->needs(named);
   command->add_option("--ca", options->mqtt.ca_file, "Certificate authority of the broker, PEM; without it no TLS");
   command->add_option("--certificate", options->mqtt.certificate_file, "Own certificate, PEM");
@@ -241,7 +259,7 @@ void add_tpr_listen(CLI::App& tpr, Action& chosen) {
       core::ok_or_throw(ground_link::parse_broker(options->broker, options->mqtt));
       if (!options->password_file.empty())
         options->mqtt.password = core::value_or_throw(ground_link::read_password(options->password_file));
-      if (const auto plain = ground_link::plain_password(options->mqtt); !plain.empty()) std::cerr << plain << '\n';
+      if (const auto plain = ground_link::plain_password(options->mqtt); !plain.empty()) tell(plain);
       if (options->forget) {
         options->mqtt.subscribe_to.clear();
         return forget(*options);

@@ -9,13 +9,16 @@ namespace {
 constexpr size_t kMostUnderWay = 20;
 constexpr size_t kMostUnstored = 1000;
 constexpr std::chrono::seconds kRetrySoon{1};  // of the store, and of what the client did not take
+constexpr std::chrono::seconds kFarewell{2};   // for what cannot be stored at the end
 constexpr int kSilentKeepAlives = 2;           // as long as it takes at most to find a broker gone
 
-/// There may be reports of before in it.
+/// There may be reports of before in it: where the folder is missing, on a disk that is mounted late.
 bool may_hold_reports(const std::filesystem::path& file) {
   std::error_code failed;
   const auto bytes = std::filesystem::file_size(file, failed);
-  return failed ? failed != std::errc::no_such_file_or_directory : bytes > 0;
+  if (!failed) return bytes > 0;
+  if (failed != std::errc::no_such_file_or_directory) return true;
+  return file.has_parent_path() && !std::filesystem::is_directory(file.parent_path(), failed);
 }
 
 }  // namespace
@@ -112,15 +115,39 @@ void GroundLink::run() {
     }
     for (auto& event : events) take(event);
     notice_silence();
-    if (last) open_again_at_ = {};
-    open_store();
-    if (store_ && (!unstored_.empty() || !delivered_.empty())) store_trouble_.clear();  // unless it is met again
-    remove_delivered();
-    store_new(last);
-    try_again();
-    publish();
-    say();
+    if (!last) work(false);
   }
+  say_farewell();
+}
+
+void GroundLink::work(bool store_all) {
+  open_store();
+  if (store_ && (!unstored_.empty() || !delivered_.empty())) store_trouble_.clear();  // unless it is met again
+  remove_delivered();
+  if (store_all) store_under_way();
+  store_new(store_all);
+  if (store_all) std::ranges::for_each(unstored_, [](Unstored& one) { one.behind = 0; });
+  try_again();
+  publish();
+  say();
+}
+
+// What is stored goes at the next start; the rest now or never, also before what lies in a store.
+void GroundLink::say_farewell() {
+  const auto until = Clock::now() + kFarewell;
+  memory_goes_at_ = {};
+  open_again_at_ = {};
+  const auto waiting = [this] { return unstored_.size() + unstored_under_way_.size(); };
+  for (work(true); waiting() > 0 && Clock::now() < until; work(true)) {
+    std::unique_lock lock(mutex_);
+    wake_.wait_until(lock, std::min(until, Clock::now() + kRetrySoon), [this] { return !events_.empty(); });
+    auto events = std::exchange(events_, {});
+    lock.unlock();
+    for (auto& event : events) take(event);
+  }
+  if (waiting() == 0 || !settings_.warn) return;
+  settings_.warn(std::to_string(waiting()) + " reports for the ground are lost: at the end they could not be stored (" +
+                 store_trouble_ + "), and " + broker() + " did not confirm them.");
 }
 
 void GroundLink::take(Event& event) {
@@ -231,8 +258,20 @@ void GroundLink::remove_delivered() {
   }
 }
 
-// One that was given to the client goes before what is stored since, and is stored at the end at most: it would come
-// behind that there.
+// At the end: a later start sends it, where it may come behind what was stored since, and twice.
+void GroundLink::store_under_way() {
+  while (store_ && !unstored_under_way_.empty()) {
+    const auto next = unstored_under_way_.begin();
+    const auto stored = store_->append(ground_link::to_bytes(next->second.report));
+    if (!stored.ok()) {
+      store_trouble_ = stored.error().message;
+      return;
+    }
+    unstored_under_way_.erase(next);
+  }
+}
+
+// One that was given to the client goes before what is stored since, and is stored at the end at most, as above.
 void GroundLink::store_new(bool all) {
   const auto is_new = [](const Unstored& one) { return !one.given; };
   auto next = all ? unstored_.begin() : std::ranges::find_if(unstored_, is_new);

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -26,12 +27,14 @@ struct GroundLinkSettings {
   std::filesystem::path store;
   size_t store_limit = 100'000;
   std::chrono::seconds read_patience{60};  // those behind stored reports that cannot be read wait so long
+  std::function<void(const std::string& sentence)> warn;  // of reports that are lost by the end; in a thread of its own
 };
 
 class GroundLink {
  public:
   /// Throws BadInput when the certificates cannot be opened. A store that cannot be is tried again.
   explicit GroundLink(const GroundLinkSettings& settings);
+  /// What cannot be stored goes to the broker, for 2 s at most.
   ~GroundLink();
   GroundLink(const GroundLink&) = delete;
   GroundLink& operator=(const GroundLink&) = delete;
@@ -73,6 +76,8 @@ class GroundLink {
   void push(Event event);
   [[nodiscard]] std::deque<Event> wait();
   void run();
+  void work(bool store_all);
+  void say_farewell();
   void take(Event& event);
   void take(ground_link::GroundReport& report);
   void take(const Connected& now);
@@ -90,6 +95,7 @@ class GroundLink {
   void wait_again(int id);
   void try_again();
   void remove_delivered();
+  void store_under_way();
   void store_new(bool all);
   void publish();
   void publish_stored();

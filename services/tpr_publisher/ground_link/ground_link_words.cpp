@@ -49,6 +49,11 @@ std::string GroundLink::trouble_with_reports() const {
 
 std::string GroundLink::storing_trouble() const {
   const size_t in_memory = unstored_.size() + unstored_under_way_.size();
+  if (!store_ && Clock::now() < memory_goes_at_) {
+    return store_trouble_ + " Reports wait up to " + std::to_string(settings_.read_patience.count()) +
+           " s for those that may lie in it: " + std::to_string(in_memory) +
+           " wait in memory, and a power cut would lose them.";
+  }
   if (!store_trouble_.empty()) {
     return store_trouble_ + " Reports go from memory: " + std::to_string(in_memory) +
            " wait there, and a power cut would lose them.";

@@ -34,10 +34,14 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
+/// Declared behind a link, whose end would wait for the disk.
+struct DiskGoesOn {
+  ~DiskGoesOn() { disk_waits = false; }
+};
+
 class BadBroker : public GroundLinkTest {
  protected:
   void SetUp() override {}  // needs no Mosquitto
-  void TearDown() override { disk_waits = false; }
   [[nodiscard]] tpr_publisher::GroundLinkSettings bad_link() const {
     auto settings = link_settings(broker_.address());
     settings.mqtt.keep_alive_s = 5;
@@ -72,8 +76,28 @@ TEST_F(BadBroker, ThatConfirmsNothingIsToldAndTheConnectionIsMadeAnewUntilItDoes
   EXPECT_THAT(stamps(3), ::testing::ElementsAre(1, 2, 3));
 }
 
+TEST_F(BadBroker, WhatItDidNotConfirmFromMemoryIsStoredAtTheEnd) {
+  broker_.confirms = false;
+  auto settings = bad_link();
+  settings.store = file("disk") / "link.db";
+  settings.read_patience = {};
+  {
+    tpr_publisher::GroundLink link(settings);
+    link.send(report(1));
+    link.send(report(2));
+    ASSERT_TRUE(wait_for([&] { return stamps(1).size() == 1; })) << link.trouble();
+    std::filesystem::create_directories(file("disk"));
+    ASSERT_TRUE(says(link, "The store works again; 1 reports of before")) << link.trouble();
+  }
+  broker_.confirms = true;
+  const tpr_publisher::GroundLink again(settings);
+  ASSERT_TRUE(wait_for([&] { return stamps(2).size() == 2; })) << again.trouble();
+  EXPECT_THAT(stamps(2), ::testing::UnorderedElementsAre(1, 2));
+}
+
 TEST_F(BadBroker, NothingOvertakesWhatWasUnderWayWhenItsConnectionBreaksBehindASlowDisk) {
   tpr_publisher::GroundLink link(bad_link());
+  const DiskGoesOn at_the_end;
   link.send(report(1));
   ASSERT_TRUE(wait_for([&] { return link.connected() && link.trouble().empty() && stamps(1).size() == 1; }));
   broker_.confirms = false;
@@ -96,20 +120,51 @@ TEST_F(BadBroker, ThatThrowsOutWhomItHasLetInIsAskedLessOftenAndTold) {
   broker_.throws_out = true;
   auto settings = bad_link();
   settings.mqtt.longest_retry_s = 1;
+  settings.mqtt.lasting = std::chrono::seconds(5);
   const auto begun = std::chrono::steady_clock::now();
-  tpr_publisher::GroundLink link(settings);
-  link.send(report(1));
+  const tpr_publisher::GroundLink link(settings);
   const std::string doubt = "in a row soon after it began: is another client called railfix-" + train_ + "?";
   ASSERT_TRUE(wait_for([&] { return broker_.connections() >= 6; })) << link.trouble();
   EXPECT_GE(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(2500)) << "0.1 + 0.2 + 0.4 + 0.8 + 1";
   EXPECT_TRUE(says(link, doubt)) << link.trouble();
-  EXPECT_THAT(link.trouble(), HasSubstr("1 reports wait"));
+  EXPECT_THAT(link.trouble(), HasSubstr("0 reports wait"));
   broker_.throws_out = false;
   ASSERT_TRUE(says(link, "Ground link: connected to " + broker_.address() + " again, but the connection has ended "))
       << link.trouble();
   EXPECT_THAT(link.trouble(), HasSubstr(doubt));
   EXPECT_FALSE(link.connected());
   EXPECT_TRUE(wait_for([&] { return link.connected() && link.trouble().empty(); })) << link.trouble();
+}
+
+TEST_F(BadBroker, ThatConfirmsWhatItGetsIsDoubtedNoMore) {
+  broker_.throws_out = true;
+  auto settings = bad_link();
+  settings.mqtt.lasting = std::chrono::hours(1);
+  tpr_publisher::GroundLink link(settings);
+  link.send(report(1));
+  ASSERT_TRUE(says(link, "is another client called")) << link.trouble();
+  EXPECT_THAT(link.trouble(), HasSubstr("1 reports wait"));
+  broker_.throws_out = false;
+  EXPECT_TRUE(wait_for([&] { return link.connected() && link.trouble().empty(); })) << link.trouble();
+}
+
+// As of a train that has radio for a moment now and then.
+TEST_F(BadBroker, ShortContactsOverWhichReportsAreConfirmedAreNoDoubt) {
+  auto settings = bad_link();
+  settings.mqtt.longest_retry_s = 60;
+  const auto begun = std::chrono::steady_clock::now();
+  tpr_publisher::GroundLink link(settings);
+  const auto came = [&](uint64_t number) {
+    const auto all = broker_.came();
+    return !all.empty() && all.back().stamp_ns == static_cast<int64_t>(number);
+  };
+  for (uint64_t i = 1; i <= 10; ++i) {
+    link.send(report(i));
+    ASSERT_TRUE(wait_for([&] { return came(i) && link.connected() && link.trouble().empty(); })) << link.trouble();
+    broker_.cut();
+    ASSERT_TRUE(wait_for([&] { return broker_.connections() == static_cast<int>(i + 1); })) << link.trouble();
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(40)) << "0.1 + 0.2 + ... + 51.2";
 }
 
 TEST_F(BadBroker, ThatSaysNothingIsCalledSilent) {

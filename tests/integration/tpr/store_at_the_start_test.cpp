@@ -15,6 +15,9 @@ class StoreAtTheStart : public GroundLinkTest {
     ASSERT_TRUE(broker_.start());
     ASSERT_TRUE(ground_.emplace(broker_.address(), train_).subscribed());
   }
+  static bool says(const tpr_publisher::GroundLink& link, const char* text) {
+    return link.trouble().find(text) != std::string::npos;
+  }
   test::Broker broker_{file("broker")};
   std::optional<Ground> ground_;
 };
@@ -22,13 +25,14 @@ class StoreAtTheStart : public GroundLinkTest {
 TEST_F(StoreAtTheStart, ReportsGoFromMemoryUntilItCanBeOpened) {
   auto settings = link_settings(broker_.address());
   settings.store = file("disk") / "link.db";
+  settings.read_patience = std::chrono::seconds(1);
   tpr_publisher::GroundLink link(settings);
   EXPECT_FALSE(link.stores());
   EXPECT_THAT(link.trouble(), HasSubstr(settings.store.string() + ": unable to open database file. "));
   link.send(report(1));
   link.send(report(2));
   ASSERT_TRUE(wait_for([&] { return ground_->count() == 2; })) << link.trouble();
-  EXPECT_THAT(link.trouble(), HasSubstr("Reports go from memory: "));
+  ASSERT_TRUE(wait_for([&] { return says(link, "Reports go from memory: "); })) << link.trouble();
   fs::create_directories(file("disk"));
   ASSERT_TRUE(wait_for([&] { return link.stores() && link.trouble().empty(); })) << link.trouble();
   EXPECT_TRUE(fs::exists(settings.store));
@@ -42,6 +46,58 @@ TEST_F(StoreAtTheStart, ReportsGoFromMemoryUntilItCanBeOpened) {
   }
 }
 
+TEST_F(StoreAtTheStart, WhatLiesOnADiskThatIsMountedLateGoesBeforeWhatIsNew) {
+  auto settings = link_settings(broker_.address());
+  settings.store = file("disk") / "link.db";
+  fs::create_directories(file("disk"));
+  broker_.stop();
+  {
+    tpr_publisher::GroundLink before(settings);
+    for (uint64_t i = 1; i <= 3; ++i) before.send(report(i));
+  }
+  fs::rename(file("disk"), file("away"));
+  ASSERT_TRUE(broker_.start());
+  tpr_publisher::GroundLink link(settings);
+  link.send(report(4));
+  ASSERT_TRUE(wait_for([&] { return link.connected() && says(link, "it: 1 wait in memory"); })) << link.trouble();
+  fs::rename(file("away"), file("disk"));
+  link.send(report(5));
+  ASSERT_TRUE(wait_for([&] { return ground_->count() == 5; })) << link.trouble();
+  const auto arrived = ground_->reports();
+  for (size_t i = 0; i < 5; ++i) EXPECT_EQ(arrived[i].stamp_ns, static_cast<int64_t>(i + 1));
+}
+
+TEST_F(StoreAtTheStart, WhatWaitsForOneThatStaysShutGoesAtTheEnd) {
+  auto settings = link_settings(broker_.address());
+  settings.warn = [](const std::string& sentence) { ADD_FAILURE() << sentence; };
+  auto other = settings;
+  other.mqtt.client_id += "-other";
+  const tpr_publisher::GroundLink has_the_store(other);
+  ASSERT_TRUE(wait_for([&] { return has_the_store.connected(); }));
+  {
+    tpr_publisher::GroundLink link(settings);
+    for (uint64_t i = 1; i <= 3; ++i) link.send(report(i));
+    ASSERT_TRUE(wait_for([&] { return link.connected() && says(link, "it: 3 wait in memory"); })) << link.trouble();
+    EXPECT_EQ(ground_->count(), 0U);
+  }
+  ASSERT_TRUE(wait_for([&] { return ground_->count() == 3; }));
+}
+
+TEST_F(StoreAtTheStart, WhatIsLostAtTheEndIsTold) {
+  auto settings = link_settings(broker_.address());
+  settings.store = file("disk") / "link.db";
+  std::vector<std::string> told;
+  settings.warn = [&](const std::string& sentence) { told.push_back(sentence); };
+  broker_.stop();
+  {
+    tpr_publisher::GroundLink link(settings);
+    link.send(report(1));
+    link.send(report(2));
+  }
+  const std::string text = "2 reports for the ground are lost: at the end they could not be stored (";
+  EXPECT_THAT(told, testing::ElementsAre(HasSubstr(text + settings.store.string() + ": unable to open")));
+}
+
 TEST_F(StoreAtTheStart, TheTrainGetsItsReportsWithoutOne) {
   const auto disk = file("disk");
   const std::string link = "tpr_publisher.ground_link.";
@@ -49,7 +105,7 @@ TEST_F(StoreAtTheStart, TheTrainGetsItsReportsWithoutOne) {
                                  link + "longest_retry_s=0.2", link + "store=" + (disk / "reports.db").string()}));
   ASSERT_TRUE(run_until([&] { return connected(); }, [] {}));
   ASSERT_TRUE(run_for(3));
-  ASSERT_TRUE(status_says("unable to open database file. Reports go from memory: "));
+  ASSERT_TRUE(status_says("unable to open database file. Reports wait up to 60 s for those that may lie in it: "));
   EXPECT_EQ(status_->state(), msg::STATE_DEGRADED);
   fs::create_directories(disk);
   ASSERT_TRUE(run_until([&] { return status_->state() == msg::STATE_ACTIVE && ground_->count() >= 3; },

@@ -102,8 +102,9 @@ TEST_F(UnreadableStore, WhatLiesInAStoreThatCannotBeOpenedAtTheStartGoesBeforeWh
   tpr_publisher::GroundLink link(settings_);
   ASSERT_TRUE(broker_.start());
   link.send(report(kReports + 1));
-  ASSERT_TRUE(wait_for([&] { return link.connected() && says(link, "Reports go from memory: 1 wait there"); }))
-      << link.trouble();
+  ASSERT_TRUE(wait_for([&] {
+    return link.connected() && says(link, "Reports wait up to 60 s for those that may lie in it: 1 wait in memory");
+  })) << link.trouble();
   EXPECT_FALSE(link.stores());
   EXPECT_EQ(ground_->count(), 0U);
   disk_fails = false;

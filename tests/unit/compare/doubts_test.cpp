@@ -180,7 +180,6 @@ TEST(Doubts, OursMayReportMoreOftenButNotMoreSeldom) {
   EXPECT_TRUE(seldom(6, 1));
   EXPECT_FALSE(seldom(1, 6));
   EXPECT_FALSE(seldom(6.5, 6));
-  EXPECT_TRUE(seldom(NAN, 1)) << "what is never said is said seldom";
   EXPECT_FALSE(seldom(NAN, NAN)) << "only reports of the same time are paired";
 }
 

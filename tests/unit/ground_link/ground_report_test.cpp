@@ -53,7 +53,7 @@ TEST(Broker, IsHostOrHostAndPort) {
   EXPECT_EQ(options.host, "10.0.0.7");
   EXPECT_EQ(options.port, 8883);
   for (const char* wrong : {"", ":1883", "host:", "host:0", "host:65536", "host:18x", "mqtt://host:1883", "[::1", "[]",
-                            "[host]:1883", "[::1]1883", "[::1]:", "2001:db8::1:18830"})
+                            "[host]:1883", "[::1]1883", "[::1]:", "2001:db8::1:18830", "fe80::1%eth0:1883"})
     EXPECT_THAT(parse_broker(wrong, options).error().message, HasSubstr("localhost:1883")) << wrong;
 }
 
