@@ -47,8 +47,7 @@ const char* sentence_of(MouseWhy why) {
       return "blind: the same picture is shown again though the train moves";
     case MouseWhy::two_motions:
       return "part of the picture moves and part does not (a pattern on the pane, or moving shadows): the train's "
-             "motion "
-             "cannot be told";
+             "motion cannot be told";
     case MouseWhy::repeats_itself:
       return "the ground repeats itself: several motions are as likely";
     case MouseWhy::none:

@@ -11,8 +11,8 @@ namespace {
 constexpr int64_t kWindowNs = core::kNsPerSecond;
 constexpr int64_t kShortNs = core::kNsPerSecond / 5;
 constexpr double kFullShare = 0.75;  // of a window: pictures do not end where it does
-constexpr double kSettledShare =
-    0.6;  // of the band, over the whole short window: 0.01 m/s does not settle at the default
+// Of the band, over the whole short window: 0.01 m/s does not settle at the default.
+constexpr double kSettledShare = 0.6;
 // A trembling camera: the two halves of the long window agree. 0.003 m/s does not settle.
 constexpr double kHalvesShare = 0.4;
 constexpr double kTrembleBands = 6;
