@@ -27,10 +27,7 @@ void MapPlace::start_on(std::shared_ptr<const track::Path> path, const TrainMoti
 }
 
 void MapPlace::tell(ToldBy by, const TrainMotion& motion) {
-  known_.told.tell(by);
-  known_.told_m = motion.distance_m();
-  known_.told_sigma_m = motion.filter().path_sigma_m();
-  known_.gnss_agreed = false;
+  known_.told.tell(by, motion.distance_m(), motion.filter().path_sigma_m());
 }
 
 // The train may stand in front of points that the place which was told lies behind.

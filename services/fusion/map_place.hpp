@@ -91,7 +91,7 @@ class MapPlace {
   [[nodiscard]] const SensorWatch& curves() const { return curves_; }
   /// GNSS has agreed with the motion for a while, and with a place that it had not given itself.
   [[nodiscard]] bool gnss_proven() const {
-    return gnss_.agreed >= kGnssProof && known_.told.by() != ToldBy::gnss && !may_be_turned_round();
+    return gnss_.agreed >= kGnssProof && known_.told.by() != ToldBy::gnss && !known_.told.may_be_turned_round();
   }
   /// GNSS, which has never agreed with it under way, says otherwise, and hardly anything speaks for it.
   [[nodiscard]] bool gnss_denies() const;
@@ -118,9 +118,6 @@ class MapPlace {
     TurnedWay turned_way;
     WrongPlace wrong_place;
     OtherWays other_ways;
-    double told_m = 0;         // the distance run when it was told ...
-    double told_sigma_m = 0;   // ... and how well it was known then
-    bool gnss_agreed = false;  // with where the cab looks there, too
     uint32_t reference = 0;
     double fix_m = 0;                // the distance run at the last fix that settled what was in doubt ...
     double reference_m = 0;          // ... and at the reference
@@ -161,9 +158,6 @@ class MapPlace {
 
   [[nodiscard]] bool may_be_beyond(double end_m, const TrainMotion& motion) const;
   [[nodiscard]] bool is_off_map(const TrainMotion& motion) const;
-  [[nodiscard]] bool tells_direction(double sigma_m, const TrainMotion& motion) const;
-  /// It was told, and nothing has shown yet that the cab looks as it was told.
-  [[nodiscard]] bool may_be_turned_round() const { return known_.told.may_be_elsewhere() && !known_.gnss_agreed; }
   void tell(ToldBy by, const TrainMotion& motion);
   void hold_gnss(double foot_m, double sigma_m, const TrainMotion& motion);
 

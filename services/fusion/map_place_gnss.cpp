@@ -7,11 +7,9 @@
 namespace railfix::fusion {
 namespace {
 
-constexpr int kAgreementsOfGnss = 5;       // in a row: where it scatters one agrees by chance
-constexpr double kSharpGnssM = 2.0;        // one sigma of an RTK solution that knows a told start as a landmark does
-constexpr double kDirectionSigmas = 10.0;  // of way: where the cab looks the other way GNSS is off by twice as much
-constexpr double kDirectionM = 10.0;       // ... at least
-constexpr double kOffTrackM = 15.0;        // a GNSS fix further beside the track is none
+constexpr int kAgreementsOfGnss = 5;  // in a row: where it scatters one agrees by chance
+constexpr double kSharpGnssM = 2.0;   // one sigma of an RTK solution that knows a told start as a landmark does
+constexpr double kOffTrackM = 15.0;   // a GNSS fix further beside the track is none
 // Of the sigma of a GNSS fix; squares add up to the whole.
 constexpr double kGnssLastingShare = 0.866;
 constexpr double kGnssNewShare = 0.5;
@@ -56,7 +54,8 @@ FootOnPath foot_on_path(const track::Path& path, double start_m, double easting_
 }  // namespace
 
 bool MapPlace::gnss_denies() const {
-  const bool never_agreed = gnss_.watch.used_ns == 0 || (gnss_.contradicts_direction && may_be_turned_round());
+  const bool never_agreed =
+      gnss_.watch.used_ns == 0 || (gnss_.contradicts_direction && known_.told.may_be_turned_round());
   return gnss_.watch.isolated && ((never_agreed && !known_.told.believed()) || known_.wrong_place.lost());
 }
 
@@ -96,17 +95,15 @@ void MapPlace::use(const GnssInput& sample, TrainMotion& motion) {
   const bool beside = beyond || std::abs(place.lateral_m) > kOffTrackM + 3 * once_m;
   const bool agrees = !beside && agrees_at(place.distance_m);
   const MeasuredPlace measured{foot_m, kGnssNewShare * once_m, StateIndex::gnss_error, kGnssLastingShare * once_m};
-  gnss_.contradicts_direction = !agrees && tells_direction(once_m, motion);
+  const bool tells_direction = known_.told.tells_direction(once_m, motion.distance_m());
+  gnss_.contradicts_direction = !agrees && tells_direction;
   if (gnss_.watch.isolated) {
     gnss_.watch.hear(agrees, kAgreementsOfGnss, sample.stamp_ns);
     hold_gnss(foot_m, once_m, motion);
   } else if (agrees && filter.offer_position(measured, parameters_->gate_gnss).used) {
     gnss_.watch.accept(sample.stamp_ns);
     ++gnss_.agreed;
-    if (tells_direction(once_m, motion)) {
-      known_.gnss_agreed = true;
-      known_.told.gnss_agrees(sample.tells_track, is_rtk(sample) && once_m <= kSharpGnssM);
-    }
+    if (tells_direction) known_.told.gnss_agrees(sample.tells_track, is_rtk(sample) && once_m <= kSharpGnssM);
     // The rival without GNSS stays lost: the interval holds what GNSS may be wrong by.
     if (gnss_proven()) known_.wrong_place.found();
   } else if (++gnss_.watch.refused >= kRefusalsToIsolate) {
@@ -115,12 +112,6 @@ void MapPlace::use(const GnssInput& sample, TrainMotion& motion) {
     gnss_.agreed = 0;
     known_.told.gnss_contradicts();
   }
-}
-
-// Where the train was told it agrees with a cab that looks the other way just as well.
-bool MapPlace::tells_direction(double sigma_m, const TrainMotion& motion) const {
-  const double least_m = std::max(kDirectionM, kDirectionSigmas * std::hypot(sigma_m, known_.told_sigma_m));
-  return std::abs(motion.distance_m() - known_.told_m) >= least_m;
 }
 
 // A wheel that nobody sees may slide, proven GNSS may be wrong: who is, nobody knows. Of the last word of each. A

@@ -1,9 +1,14 @@
 #include "fusion/told_place.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace railfix::fusion {
 namespace {
 
-constexpr int kCurvesConfirm = 3;  // a place that was only told
+constexpr int kCurvesConfirm = 3;          // a place that was only told
+constexpr double kDirectionSigmas = 10.0;  // of way: where the cab looks the other way GNSS is off by twice as much
+constexpr double kDirectionM = 10.0;       // ... at least
 
 }  // namespace
 
@@ -48,7 +53,13 @@ void ToldPlace::curve_agrees(bool tells_track, bool turns_otherwise) {
 
 // A single fix errs by metres that last, however low its HDOP is.
 void ToldPlace::gnss_agrees(bool tells_track, bool is_sharp) {
+  gnss_agreed_ = true;
   if (confirms_start(tells_track)) by_ = is_sharp ? ToldBy::nobody : ToldBy::start_and_gnss;
+}
+
+bool ToldPlace::tells_direction(double gnss_sigma_m, double distance_m) const {
+  const double least_m = std::max(kDirectionM, kDirectionSigmas * std::hypot(gnss_sigma_m, sigma_m_));
+  return std::abs(distance_m - distance_m_) >= least_m;
 }
 
 }  // namespace railfix::fusion

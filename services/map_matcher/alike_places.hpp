@@ -3,8 +3,6 @@
 // What stands unevenly, a balise, a frog or a bridge does not.
 #pragma once
 
-#include <algorithm>
-
 #include "map_matcher/sighting_history.hpp"
 #include "track/path.hpp"
 
@@ -18,13 +16,6 @@ struct TakenPlace {
   double now_m = 0;         // distance run
   double since_told_m = 0;  // way from where somebody told it, signed
 };
-
-/// Of a history for it.
-inline LandmarkParameters for_alike_places(LandmarkParameters parameters) {
-  constexpr double kWayM = 3000;  // over which distances between rare ones tell
-  parameters.history_m = std::max(parameters.history_m, kWayM);
-  return parameters;
-}
 
 class AlikePlaces {
  public:

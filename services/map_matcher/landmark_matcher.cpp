@@ -25,25 +25,21 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
   const double margin_m = parameters_.window_margin_m + 3 * sighting.sigma_m;
   const double expected_m = prior.path_distance_m + sighting.distance_ahead_m;
   const Window window{expected_m, expected_m - prior.over_m - margin_m, expected_m + prior.under_m + margin_m};
-  const bool again = history_.make_room(sighting, place_m);
-  way_so_far_.make_room(sighting, place_m);
+  const bool again = seen_.make_room(sighting, place_m);
   auto candidates = landmarks_of_kind(*path_, sighting.kind, window.from_m, window.to_m);
   std::erase_if(candidates, [&](const auto* mark) { return !fits_aside(sighting, *mark); });
   if (candidates.size() > kMostCandidates) {
-    way_so_far_.add(sighting, place_m);
-    history_.add(sighting, place_m);  // for when the window is smaller, or for those of a rarer kind
+    seen_.add(sighting, place_m);  // for when the window is smaller, or for those of a rarer kind
     return std::nullopt;
   }
   const Weights weights = weigh(sighting, place_m, window, candidates);
   if (weights.here > 0 && !again) {
     odds_elsewhere_ = std::clamp(weights.elsewhere / weights.here, std::min(odds_elsewhere_, kConfirmed), kMostOdds);
-    for (auto* history : {&history_, &way_so_far_})
-      history->unmapped(sighting.kind).learn(place_m, weights.nothing / weights.here);
+    seen_.unmapped(sighting.kind).learn(place_m, weights.nothing / weights.here);
   }
   confirmed_ = odds_elsewhere_ <= (confirmed_ ? kLost : kConfirmed);
   told_apart_ = told_apart_ && confirmed_;
-  history_.add(sighting, place_m);
-  way_so_far_.add(sighting, place_m);
+  seen_.add(sighting, place_m);
   const double sum = weights.here + weights.elsewhere;
   const auto* best = weights.best;
   if (best == nullptr || !(weights.of_best >= parameters_.min_probability * sum)) return std::nullopt;
@@ -62,24 +58,25 @@ std::optional<Fix> LandmarkMatcher::add(const Sighting& sighting, const Prior& p
 // window. That the train is not in the window at all is weighed by what such a sighting would be by chance; the odds of
 // that go on from sighting to sighting.
 LandmarkMatcher::Weights LandmarkMatcher::weigh(const Sighting& sighting, double place_m, const Window& window,
-                                                const std::vector<const track::PathLandmark*>& candidates) {
+                                                const std::vector<const track::PathLandmark*>& candidates) const {
   const double length_m = window.to_m - window.from_m;
   const double confidence = std::clamp(sighting.confidence, 0.01, 0.999);
   const double expected = std::max(1.0, parameters_.detection * static_cast<double>(candidates.size()));
   const double doubt = std::max(0.0, kUsualConfidence - confidence);
-  const double earlier = history_.mean_fit(*path_, window.from_m - place_m, window.to_m - place_m, place_m);
-  const double unmapped_per_m = history_.unmapped(sighting.kind).per_m();
+  const SightingHistory lately = seen_.lately(place_m);
+  const double earlier = lately.mean_fit(*path_, window.from_m - place_m, window.to_m - place_m, place_m);
+  const double unmapped_per_m = lately.unmapped_per_m(sighting.kind);
   Weights weights;
   weights.nothing = earlier * (doubt * expected + unmapped_per_m * length_m);
   weights.here = weights.nothing;
   for (const auto* landmark : candidates) {
     const double shift_m = landmark->distance_m - place_m;
     const double chance = confidence * parameters_.detection;
-    const double weight = chance * (1 - parameters_.moved) * history_.fits(*path_, shift_m, place_m);
+    const double weight = chance * (1 - parameters_.moved) * lately.fits(*path_, shift_m, place_m);
     const double still_m =
         std::min(kMovedSigmas * std::hypot(sighting.sigma_m, landmark->landmark->sigma_m), 0.5 * parameters_.moved_m);
-    const double moved = 0.5 * (history_.mean_fit(*path_, shift_m - parameters_.moved_m, shift_m - still_m, place_m) +
-                                history_.mean_fit(*path_, shift_m + still_m, shift_m + parameters_.moved_m, place_m));
+    const double moved = 0.5 * (lately.mean_fit(*path_, shift_m - parameters_.moved_m, shift_m - still_m, place_m) +
+                                lately.mean_fit(*path_, shift_m + still_m, shift_m + parameters_.moved_m, place_m));
     weights.here += weight + chance * parameters_.moved * moved;
     if (weight <= weights.of_best) continue;
     weights.best = landmark;
@@ -95,7 +92,7 @@ LandmarkMatcher::Weights LandmarkMatcher::weigh(const Sighting& sighting, double
 // weighed against the place, they would not be.
 bool LandmarkMatcher::is_told_apart(const track::PathLandmark& landmark, double place_m, const Window& window,
                                     const Prior& prior) const {
-  return !AlikePlaces(way_so_far_, *path_)
+  return !AlikePlaces(seen_, *path_)
               .any({.shift_m = landmark.distance_m - place_m,
                     .least_m = window.from_m - place_m,
                     .most_m = window.to_m - place_m,

@@ -18,10 +18,7 @@ class LandmarkMatcher {
  public:
   /// told_m: travelled distance where the place was told.
   LandmarkMatcher(const LandmarkParameters& parameters, std::shared_ptr<const track::Path> path, double told_m = 0)
-      : parameters_(parameters),
-        path_(std::move(path)),
-        history_(parameters),
-        way_so_far_(for_alike_places(parameters)) {
+      : parameters_(parameters), path_(std::move(path)), seen_(parameters) {
     forget(told_m);
   }
 
@@ -38,8 +35,7 @@ class LandmarkMatcher {
   [[nodiscard]] double place_doubt() const { return doubt() > kDoubted ? doubt() : 0; }
   /// The travelled distance does not go on from the one before: earlier sightings say nothing any more.
   void forget(double told_m) {
-    history_.begin_anew();
-    way_so_far_.begin_anew();
+    seen_.begin_anew();
     told_m_ = told_m;
     odds_elsewhere_ = parameters_.elsewhere / (1 - parameters_.elsewhere);
     confirmed_ = told_apart_ = false;
@@ -62,15 +58,14 @@ class LandmarkMatcher {
     double elsewhere = 0;  // it is not
   };
   [[nodiscard]] Weights weigh(const Sighting& sighting, double place_m, const Window& window,
-                              const std::vector<const track::PathLandmark*>& candidates);
+                              const std::vector<const track::PathLandmark*>& candidates) const;
   /// No other place near would fit as well as the one where this is the landmark.
   [[nodiscard]] bool is_told_apart(const track::PathLandmark& landmark, double place_m, const Window& window,
                                    const Prior& prior) const;
 
   LandmarkParameters parameters_;
   std::shared_ptr<const track::Path> path_;
-  SightingHistory history_;
-  SightingHistory way_so_far_;  // as many of them, from further back: balises alone come every kilometre
+  SightingHistory seen_;
   double told_m_ = 0;
   double odds_elsewhere_ = 0;  // against that it is in the window
   bool confirmed_ = false;

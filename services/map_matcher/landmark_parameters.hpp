@@ -11,7 +11,7 @@ struct LandmarkParameters {
   double elsewhere = 1e-3;       // chance that the train is not in the window: somebody has told its start wrongly
   double scale_sigma = 0.01;     // of the distance run between sightings
   double window_margin_m = 2.0;  // beyond the promised interval of train_state
-  double history_m = 600;        // sightings further back are forgotten
+  double history_m = 600;        // sightings are judged together over this way
   double min_probability = 0.5;  // of a fix that is worth sending
 };
 

@@ -10,6 +10,7 @@ namespace {
 constexpr double kDensityReachM = 200;  // of mapped landmarks, for the chance of a random hit
 constexpr double kFitStepM = 0.7;       // earlier sightings fit within about so much
 constexpr size_t kMostSightings = 12;
+constexpr double kRareM = 3000;        // over which distances between rare things tell places apart
 constexpr int kScaleSteps = 4;         // to either side
 constexpr double kScaleStep = 0.6;     // sigmas
 constexpr double kScaleChanges = 0.3;  // share of the scale's sigma that differs from place to place
@@ -32,7 +33,8 @@ void UnmappedRate::learn(double place_m, double probability) {
 }
 
 bool SightingHistory::make_room(const Sighting& sighting, double place_m) {
-  std::erase_if(seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > parameters_.history_m; });
+  const double reach_m = std::max(parameters_.history_m, kRareM);
+  std::erase_if(seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > reach_m; });
   return std::erase_if(seen_, [&](const Seen& seen) { return is_of(seen, sighting, place_m); }) > 0;
 }
 
@@ -44,6 +46,12 @@ void SightingHistory::add(const Sighting& sighting, double place_m) {
 void SightingHistory::begin_anew() {
   seen_.clear();
   for (auto& [kind, rate] : unmapped_) rate.begin_way();
+}
+
+SightingHistory SightingHistory::lately(double place_m) const {
+  SightingHistory near = *this;
+  std::erase_if(near.seen_, [&](const Seen& seen) { return std::abs(place_m - seen.place_m) > parameters_.history_m; });
+  return near;
 }
 
 SightingHistory SightingHistory::turned_round() const {

@@ -47,6 +47,8 @@ class SightingHistory {
   void add(const Sighting& sighting, double place_m);
   /// Distances do not go on from those before.
   void begin_anew();
+  /// Those that are within `history_m` of the place; the others lie up to 3 km behind.
+  [[nodiscard]] SightingHistory lately(double place_m) const;
   /// As a train would have sighted it that runs along the same track, but looks the other way; distance run counts
   /// backwards in it.
   [[nodiscard]] SightingHistory turned_round() const;
@@ -64,6 +66,7 @@ class SightingHistory {
   }
 
   [[nodiscard]] const std::deque<Seen>& seen() const { return seen_; }
+  [[nodiscard]] double unmapped_per_m(track::LandmarkKind kind) const;
   UnmappedRate& unmapped(track::LandmarkKind kind) {
     return unmapped_.try_emplace(kind, parameters_.false_per_m).first->second;
   }
@@ -75,7 +78,6 @@ class SightingHistory {
                                      Against against) const;
   [[nodiscard]] double sighting_fits(const track::Path& path, const Seen& seen, double path_m, double now_m,
                                      Against against) const;
-  [[nodiscard]] double unmapped_per_m(track::LandmarkKind kind) const;
   [[nodiscard]] bool has(track::LandmarkKind kind) const;
   /// Both are probably of one object.
   [[nodiscard]] bool is_of(const Seen& seen, const Sighting& sighting, double place_m) const;

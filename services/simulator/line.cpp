@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "core/units.hpp"
 
@@ -140,6 +139,12 @@ bool begins_in_tunnel(const track::Path& way_here, double begin_m) {
 
 }  // namespace
 
+std::set<uint32_t> edges_between(const track::Path& path, double from_m, double to_m) {
+  std::set<uint32_t> edges{path.position_at(to_m).edge};
+  for (double s = from_m; s < to_m; s += 1.0) edges.insert(path.position_at(s).edge);
+  return edges;
+}
+
 core::Result<Line> Line::make(std::shared_ptr<const track::Map> map, const track::EdgePosition& start, double ahead_m,
                               const std::vector<uint32_t>& via) {
   auto counted = start;
@@ -178,8 +183,7 @@ void Line::sample_main() {
 }
 
 void Line::sample_branches() {
-  std::set<uint32_t> on_path;
-  for (double s = path_.begin_m(); s <= path_.end_m(); s += 1.0) on_path.insert(path_.position_at(s).edge);
+  const auto on_path = edges_between(path_, path_.begin_m(), path_.end_m());
   const Neighbourhood neighbourhood(main_);
   for (const auto& edge : path_.map().edges) {
     if (on_path.contains(edge.id) || !comes_near(neighbourhood, edge.alignment)) continue;
@@ -202,10 +206,6 @@ Spot Line::spot_of(double easting_m, double northing_m) const {
           -de * std::cos(pose.heading_rad) + dn * std::sin(pose.heading_rad)};
 }
 
-double Line::heading_near(const track::PlanPose& pose) const {
-  return main_.samples[nearest_sample(main_, pose.easting_m, pose.northing_m)].pose.heading_rad;
-}
-
 void Line::collect_things() {
   for (const auto& mark : path_.landmarks())
     things_.push_back({mark.kind, mark.distance_m, mark.lateral_m, true, mark.lateral_m < 0.0 ? -1.0 : 1.0});
@@ -217,8 +217,9 @@ void Line::collect_things() {
                                  mark->kind == track::LandmarkKind::balise;
       if (!stands_beside) continue;
       const auto pose = alignment.at(mark->offset_m).pose;
-      if (std::abs(std::cos(pose.heading_rad - heading_near(pose))) < kAlongCosine) continue;
       const auto centre = spot_of(pose.easting_m, pose.northing_m);
+      const double turn = pose.heading_rad - sample_at(centre.distance_m).pose.heading_rad;
+      if (std::abs(std::cos(turn)) < kAlongCosine) continue;
       const auto spot = spot_of(pose.easting_m - mark->lateral_m * std::cos(pose.heading_rad),
                                 pose.northing_m + mark->lateral_m * std::sin(pose.heading_rad));
       const bool within = spot.distance_m > path_.begin_m() && spot.distance_m < path_.end_m();
@@ -324,11 +325,15 @@ void Line::place_distractors() {
   }
 }
 
-std::vector<double> Line::tracks_at(double distance_m) const {
-  std::vector<double> laterals{0.0};
+const CentreSample& Line::sample_at(double distance_m) const {
   const double position =
       std::clamp((distance_m - main_.begin_m) / kCentreStepM, 0.0, static_cast<double>(main_.samples.size() - 1));
-  const auto& here = main_.samples[static_cast<size_t>(position)].pose;
+  return main_.samples[static_cast<size_t>(position)];
+}
+
+std::vector<double> Line::tracks_at(double distance_m) const {
+  std::vector<double> laterals{0.0};
+  const auto& here = sample_at(distance_m).pose;
   for (const auto& branch : branches_) {
     if (distance_m < branch.begin_m - 40.0 ||
         distance_m > branch.begin_m + static_cast<double>(branch.samples.size()) * kCentreStepM + 40.0)

@@ -2,7 +2,9 @@
 // what stands along it.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <set>
 #include <vector>
 
 #include "core/result.hpp"
@@ -80,6 +82,9 @@ struct TexturePlace {
   bool forward = true;  // the path runs as that counting does
 };
 
+/// Over which edges a path runs there.
+std::set<uint32_t> edges_between(const track::Path& path, double from_m, double to_m);
+
 /// Read-only after it is made; may be used from many threads.
 class Line {
  public:
@@ -116,8 +121,8 @@ class Line {
   void collect_objects();
   void place_distractors();
   [[nodiscard]] Spot spot_of(double easting_m, double northing_m) const;
-  /// Of the path where it is nearest.
-  [[nodiscard]] double heading_near(const track::PlanPose& pose) const;
+  /// Of the path.
+  [[nodiscard]] const CentreSample& sample_at(double distance_m) const;
   track::Path path_;
   double counted_from_m_ = 0;
   bool counted_forward_ = true;

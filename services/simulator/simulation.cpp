@@ -95,14 +95,6 @@ class Studio {
   core::Status status_;
 };
 
-bool comes_to(const track::Path& path, uint32_t edge, double ahead_m) {
-  const double end_m = std::min(ahead_m, path.end_m());
-  for (double s = 0.0; s < end_m; s += 1.0) {
-    if (path.position_at(s).edge == edge) return true;
-  }
-  return path.position_at(end_m).edge == edge;
-}
-
 core::Result<std::shared_ptr<const Line>> make_line(const SimulationOptions& options) {
   auto map = options.map;
   if (!map) {
@@ -122,8 +114,10 @@ core::Result<std::shared_ptr<const Line>> make_line(const SimulationOptions& opt
       options.run.length_m > 0.0 ? options.run.length_m : options.run.duration_s * options.run.cruise_mps;
   auto line = Line::make(map, start.value(), ahead_m, via);
   if (!line.ok()) return line.error();
+  const auto& path = line.value().path();
+  const auto run_over = edges_between(path, 0.0, std::min(ahead_m, path.end_m()));
   for (size_t i = 0; i < via.size(); ++i) {
-    if (!comes_to(line.value().path(), via[i], ahead_m)) {
+    if (!run_over.contains(via[i])) {
       return core::Error{"--via " + options.via[i] + ": the way from " + options.start +
                          " does not come to it within " + std::to_string(std::lround(ahead_m)) +
                          " m; name the edge behind the switch to turn at"};

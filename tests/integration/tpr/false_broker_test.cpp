@@ -47,8 +47,8 @@ class BadBroker : public GroundLinkTest {
     settings.mqtt.keep_alive_s = 5;
     return settings;
   }
-  static bool says(const tpr_publisher::GroundLink& link, const std::string& text) {
-    return wait_for([&] { return link.trouble().find(text) != std::string::npos; });
+  static bool comes_to_say(const tpr_publisher::GroundLink& link, const std::string& text) {
+    return wait_for([&] { return says(link, text); });
   }
   [[nodiscard]] std::vector<int64_t> stamps(int connection) const {
     std::vector<int64_t> stamps;
@@ -66,7 +66,7 @@ TEST_F(BadBroker, ThatConfirmsNothingIsToldAndTheConnectionIsMadeAnewUntilItDoes
   for (uint64_t i = 1; i <= 3; ++i) link.send(report(i));
   ASSERT_TRUE(wait_for([&] { return stamps(2).size() == 1; })) << link.trouble();
   EXPECT_FALSE(link.connected()) << "let in again, and no better";
-  ASSERT_TRUE(says(link, "Ground link: the broker " + broker_.address() + " has confirmed nothing for "));
+  ASSERT_TRUE(comes_to_say(link, "Ground link: the broker " + broker_.address() + " has confirmed nothing for "));
   EXPECT_THAT(link.trouble(), HasSubstr("3 reports wait"));
   EXPECT_FALSE(link.connected());
   broker_.confirms = true;
@@ -87,7 +87,7 @@ TEST_F(BadBroker, WhatItDidNotConfirmFromMemoryIsStoredAtTheEnd) {
     link.send(report(2));
     ASSERT_TRUE(wait_for([&] { return stamps(1).size() == 1; })) << link.trouble();
     std::filesystem::create_directories(file("disk"));
-    ASSERT_TRUE(says(link, "The store works again; 1 reports of before")) << link.trouble();
+    ASSERT_TRUE(comes_to_say(link, "The store works again; 1 reports of before")) << link.trouble();
   }
   broker_.confirms = true;
   const tpr_publisher::GroundLink again(settings);
@@ -126,10 +126,11 @@ TEST_F(BadBroker, ThatThrowsOutWhomItHasLetInIsAskedLessOftenAndTold) {
   const std::string doubt = "in a row soon after it began: is another client called railfix-" + train_ + "?";
   ASSERT_TRUE(wait_for([&] { return broker_.connections() >= 6; })) << link.trouble();
   EXPECT_GE(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(2500)) << "0.1 + 0.2 + 0.4 + 0.8 + 1";
-  EXPECT_TRUE(says(link, doubt)) << link.trouble();
+  EXPECT_TRUE(comes_to_say(link, doubt)) << link.trouble();
   EXPECT_THAT(link.trouble(), HasSubstr("0 reports wait"));
   broker_.throws_out = false;
-  ASSERT_TRUE(says(link, "Ground link: connected to " + broker_.address() + " again, but the connection has ended "))
+  ASSERT_TRUE(
+      comes_to_say(link, "Ground link: connected to " + broker_.address() + " again, but the connection has ended "))
       << link.trouble();
   EXPECT_THAT(link.trouble(), HasSubstr(doubt));
   EXPECT_FALSE(link.connected());
@@ -142,7 +143,7 @@ TEST_F(BadBroker, ThatConfirmsWhatItGetsIsDoubtedNoMore) {
   settings.mqtt.lasting = std::chrono::hours(1);
   tpr_publisher::GroundLink link(settings);
   link.send(report(1));
-  ASSERT_TRUE(says(link, "is another client called")) << link.trouble();
+  ASSERT_TRUE(comes_to_say(link, "is another client called")) << link.trouble();
   EXPECT_THAT(link.trouble(), HasSubstr("1 reports wait"));
   broker_.throws_out = false;
   EXPECT_TRUE(wait_for([&] { return link.connected() && link.trouble().empty(); })) << link.trouble();
@@ -170,14 +171,14 @@ TEST_F(BadBroker, ShortContactsOverWhichReportsAreConfirmedAreNoDoubt) {
 TEST_F(BadBroker, ThatSaysNothingIsCalledSilent) {
   broker_.lets_in = false;
   const tpr_publisher::GroundLink link(bad_link());
-  ASSERT_TRUE(says(link, "(it has not answered for 5 s)")) << link.trouble();
+  ASSERT_TRUE(comes_to_say(link, "(it has not answered for 5 s)")) << link.trouble();
 }
 
 TEST_F(BadBroker, WhoseLimitsAreReachedIsNoMatterOfRights) {
   broker_.confirms_with = 0x97;
   tpr_publisher::GroundLink link(bad_link());
   link.send(report(1));
-  ASSERT_TRUE(says(link, "(Quota exceeded)")) << link.trouble();
+  ASSERT_TRUE(comes_to_say(link, "(Quota exceeded)")) << link.trouble();
   EXPECT_THAT(link.trouble(), Not(HasSubstr("acl_file")));
   broker_.confirms_with = 0;
   EXPECT_TRUE(wait_for([&] { return link.connected() && link.trouble().empty(); })) << link.trouble();

@@ -123,6 +123,9 @@ class GroundLinkTest : public TprService {
   [[nodiscard]] ground_link::GroundReport report(uint64_t number) const {
     return {train_, 0, 0, static_cast<int64_t>(number), 0, 3, 1, {0x88}, ""};
   }
+  static bool says(const tpr_publisher::GroundLink& link, const std::string& text) {
+    return link.trouble().find(text) != std::string::npos;
+  }
   template <class Condition>
   static bool wait_for(Condition condition) {
     for (int i = 0; i < 6000 && !condition(); ++i) poll(nullptr, 0, 10);

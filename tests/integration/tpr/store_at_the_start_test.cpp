@@ -15,9 +15,6 @@ class StoreAtTheStart : public GroundLinkTest {
     ASSERT_TRUE(broker_.start());
     ASSERT_TRUE(ground_.emplace(broker_.address(), train_).subscribed());
   }
-  static bool says(const tpr_publisher::GroundLink& link, const char* text) {
-    return link.trouble().find(text) != std::string::npos;
-  }
   test::Broker broker_{file("broker")};
   std::optional<Ground> ground_;
 };

@@ -54,10 +54,6 @@ class UnreadableStore : public GroundLinkTest {
   tpr_publisher::GroundLinkSettings settings_;
 };
 
-bool says(const tpr_publisher::GroundLink& link, const char* text) {
-  return link.trouble().find(text) != std::string::npos;
-}
-
 TEST_F(UnreadableStore, ReportsWaitUntilTheyCanBeReadAndNoneIsLost) {
   tpr_publisher::GroundLink link(settings_);
   disk_fails = true;
@@ -90,7 +86,7 @@ TEST_F(UnreadableStore, WhatStaysUnreadableHoldsNewerReportsUpOnlyForAWhile) {
       return !reports.empty() && reports.back().stamp_ns == static_cast<int64_t>(kReports + 1);
     })) << link.trouble();
     lost = kReports + 1 - ground_->count();
-    EXPECT_TRUE(wait_for([&] { return says(link, (std::to_string(lost) + " reports").c_str()); })) << link.trouble();
+    EXPECT_TRUE(wait_for([&] { return says(link, std::to_string(lost) + " reports"); })) << link.trouble();
   }
   EXPECT_GT(lost, 0U);
   const tpr_publisher::GroundLink again(settings_);

@@ -95,8 +95,7 @@ std::string text_of(const Doubts& doubts) {
   if (doubts.ours_silent()) {
     return text_of(
         "at %zu of %zu certified reports ours is silent for longer than --longest-gap-s, or a side came to its group "
-        "by "
-        "another way (NID_PRVLRBG), and what it would have said is not known",
+        "by another way (NID_PRVLRBG), and what it would have said is not known",
         doubts.silent, doubts.heard);
   }
   if (doubts.other_times()) {
